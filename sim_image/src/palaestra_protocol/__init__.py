@@ -5,6 +5,7 @@
 - `ros`: ROS 1 between trainer and simulator: connections, types and values
 - `scene`: the visible shapes of a world and their poses, for viewers and replays
 - `batch`: the requests of a trainer to a simulator with many copies of its world
+- `obstacle_shapes`: the shapes of obstacles on a floor, in the axes of their objects
 - `camera_picture`: the newest picture of a robot's camera, for viewers
 - `foreign_words`: options of other projects, and the TrainingJob fields that replace them
 - `messages`: derives the reader and the writer of a JSON message from its declaration

@@ -2,6 +2,10 @@
 
 import pytest
 
+from palaestra_sim.mujoco.batched.shapes import shapes_of
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 from palaestra_trainer.environments import MoveToTargetEnv
 from palaestra_trainer.errors import NoSuchSensor, WorldMisfit
@@ -42,6 +46,13 @@ FITTED = b"""
       device [ LinearMotor { name "gripper right" maxPosition 0.03 } ]
       endPoint Solid { name "right finger" }
     }
+"""
+TURNED = b"""
+DEF TURNED Solid { translation 5 5 0.5 rotation 0 0 1 0.5 name "turned" boundingObject Group { children [
+  Pose { translation 0.1 0.2 0 rotation 0 0 1 0.7 children Shape { geometry Box { size 0.3 0.1 0.2 } } }
+  Transform { translation 0.5 0 0 scale 2 3 1 children Box { } }
+  Pose { translation 0 1 0 rotation 1 0 0 1.5707963 children Cylinder { radius 0.1 height 0.4 } }
+  Sphere { radius 0.1 } ] } }
 """
 
 
@@ -185,6 +196,25 @@ def test_the_layout_is_that_of_the_world(arena, running):
             )
 
 
+def test_turned_and_scaled_obstacles_are_those_of_the_copies(running):
+    """A policy is trained in the copies and evaluated over ROS, so both must draw the same free places."""
+    world = builtin("arena").replace(b"DEF FLOOR Solid {", b"DEF FLOOR Solid { rotation 0 0 1 1.5707963")
+    robot, _ = running(Robotino, world + TURNED, "robotino")
+    services = Noting(robot.node_name)
+    try:
+        found = [
+            (thing.name, *thing.place, thing.heading_rad, *shape.center, *shape.half, shape.radius_m)
+            for thing in ObstacleReader(services).read()
+            for shape in thing.shapes
+        ]
+    finally:
+        services.close()
+    simulation = Simulation.load(world + TURNED, StubPhysics(), "world.wbt", Mode.FAST)
+
+    assert found == [tuple(shape.to_json().values()) for shape in shapes_of(simulation)]
+    assert len([it for it in found if it[0] == "TURNED"]) == 4
+
+
 def test_the_layout_follows_a_thing_that_somebody_moved(arena):
     """The supervisor or `put` may move an obstacle, and a new episode moves it back."""
     arena.scene.supervisor.set_field("CYLINDER_0", "translation", (1.5, 0.0, 0.2))
@@ -223,13 +253,13 @@ def test_a_world_without_a_floor_is_refused(running):
 
 
 def test_only_what_looks_different_when_turned_is_asked_for_its_orientation(arena):
-    """Each request costs time at every reset.
-
-    The floor in a layout has only two corners, so its heading is not needed.
-    """
+    """Each request costs time at every reset. The first reading asks for the tilt of each object."""
     services = Noting(arena.webots.supervisor.node_name)
     try:
-        things = ObstacleReader(services).read()
+        reader = ObstacleReader(services)
+        reader.read()
+        services.asked.clear()
+        things = reader.read()
     finally:
         services.close()
 

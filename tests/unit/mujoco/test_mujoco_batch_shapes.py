@@ -57,6 +57,27 @@ def test_the_parts_of_a_group_have_their_own_centers() -> None:
 
 
 @pytest.mark.parametrize(
+    ("outline", "fields", "half", "radius"),
+    [
+        ("Pose { rotation 0 0 1 1.5707963 children Box { size 1 2 3 } }", "", (1.0, 0.5, 1.5), 0.0),
+        ("Transform { scale 2 3 1 children Box { size 1 2 3 } }", "", (1.0, 3.0, 1.5), 0.0),
+        ("Pose { rotation 1 0 0 1.5707963 children Cylinder { radius 0.5 height 2 } }", "", (0.5, 1, 0.5), 0),
+        ("Cylinder { radius 0.5 height 2 }", "rotation 1 0 0 1.5707963", (0.5, 1.0, 0.5), 0.0),
+        ("Cylinder { radius 0.5 height 2 }", "rotation 1 0 0 3.1415926535", (0.0, 0.0, 1.0), 0.5),
+        ("Capsule { radius 0.5 height 2 }", "rotation 0 1 0 1.5707963", (1.5, 0.5, 0.5), 0.0),
+        ("Sphere { radius 0.5 }", "rotation 0 1 0 1", (0.0, 0.0, 0.5), 0.5),
+        ("Box { size 1 2 3 }", "rotation 0 1 0 1.5707963", (1.5, 1.0, 0.5), 0.0),
+    ],
+)
+def test_a_turned_or_scaled_shape_has_its_extent_in_the_object(outline, fields, half, radius) -> None:
+    """A barrel lies, and a wall is turned inside its Solid; a start must not be drawn inside of them."""
+    [found] = shapes(solid(outline, fields))
+
+    assert (found.half_x, found.half_y, found.half_z) == pytest.approx(half, abs=1e-6)
+    assert found.radius == radius
+
+
+@pytest.mark.parametrize(
     ("outline", "heading_rad"),
     [
         ("Box { }", 0.5),

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_protocol.batch import PLACE_VALUES, BatchDescription, BatchRequest, BatchShape
+from palaestra_protocol.obstacle_shapes import ObstacleShape
 from palaestra_trainer.errors import ConfigurationError, NoReading
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 from palaestra_trainer.robots.batch_link import BatchLink, BatchReading, BatchReset
@@ -35,7 +36,7 @@ from palaestra_trainer.robots.robotino import Robotino, wheel_speeds
 from palaestra_trainer.robots.simulated import SimulatedRobot, layout_of
 from palaestra_trainer.webots import Thing
 from palaestra_trainer.webots.fields import turn_about_z
-from palaestra_trainer.webots.obstacles import FLOOR, FLOOR_REMEDY, ObstacleShape
+from palaestra_trainer.webots.obstacles import FLOOR, FLOOR_REMEDY
 
 
 class BatchedRobot(BatchedRobotAbc):

@@ -10,7 +10,13 @@ import math
 from collections.abc import Iterable
 from typing import ClassVar
 
-from palaestra_trainer.errors import MissingCapability, NoReading, NoSuchSensor, WorldMisfit
+from palaestra_trainer.errors import (
+    ConfigurationError,
+    MissingCapability,
+    NoReading,
+    NoSuchSensor,
+    WorldMisfit,
+)
 from palaestra_trainer.robots.base import JointScene, RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import Localization
 from palaestra_trainer.robots.geometry import Point, Pose
@@ -27,6 +33,7 @@ from palaestra_trainer.webots import (
 )
 
 PERIOD_MS = 192  # six basic steps of 32 ms
+_SQUARE = 1e-3  # greatest difference of a floor's heading from a multiple of 90 degrees, in quarters
 DOT_M = 0.1  # radius of a robot in a recording if its class has no radius
 
 
@@ -272,15 +279,33 @@ class SimulatedScene(Scene, JointScene):
 
 
 def layout_of(things: Iterable[Thing]) -> FloorLayout:
-    """Return the layout of objects, of which one is the floor."""
+    """Return the layout of objects, of which one is the floor.
+
+    Raises:
+        ConfigurationError: the floor has no box, or its sides are not along the axes of the world.
+    """
     low, high, obstacles = (0.0, 0.0), (0.0, 0.0), list[Obstacle]()
     for thing in things:
         if thing.name == FLOOR:
-            (x, y, _), half = thing.place, thing.shapes[0].half
-            low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
+            low, high = _corners(thing)
         else:
             obstacles += _obstacles(thing)
     return FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
+
+
+def _corners(floor: Thing) -> tuple[Point, Point]:
+    """Return the lowest and the highest x and y of the floor."""
+    quarters = floor.heading_rad / (0.5 * math.pi)
+    if abs(quarters - round(quarters)) > _SQUARE:
+        raise ConfigurationError(
+            f"world: the floor is turned by {floor.heading_rad:.3f} rad about z, so its sides are not along x"
+            " and y; turn it by a multiple of 90 degrees"
+        )
+    box = next((shape for shape in _obstacles(floor) if not shape.radius_m), None)
+    if box is None:
+        raise ConfigurationError("world: the floor is round; give its Solid a Box as its boundingObject")
+    along, across = box.half_m if round(quarters) % 2 == 0 else reversed(box.half_m)
+    return (box.x_m - along, box.y_m - across), (box.x_m + along, box.y_m + across)
 
 
 def _obstacles(thing: Thing) -> list[Obstacle]:

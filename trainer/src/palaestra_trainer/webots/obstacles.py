@@ -9,10 +9,17 @@ program adds while the simulation runs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from palaestra_protocol.obstacle_shapes import (
+    ObstacleShape,
+    PartFrame,
+    Turn,
+    Vector,
+    heading_of,
+    tilt_of,
+)
 from palaestra_trainer.errors import WorldMisfit
 from palaestra_trainer.webots.services import Services
 
@@ -25,22 +32,10 @@ _FLOOR_FIELDS = {
     "RectangleArena": "floorSize",
     "Floor": "size",
 }  # the field that holds the size, for each PROTO of Webots
-_ROUND = ("Cylinder", "Capsule", "Sphere")
-_WRAPPERS = ("Pose", "Transform", "Group", "Shape")
-
-Vector = tuple[float, float, float]
-
-
-class ObstacleShape(NamedTuple):
-    """A box or an upright cylinder: center in the object's frame, half the size, and radius (0 for a box)."""
-
-    center: Vector
-    half: Vector
-    radius_m: float
 
 
 class Thing(NamedTuple):
-    """An object: DEF name or "", position, rotation about z (0 for the floor), and shapes."""
+    """An object: DEF name or "", position, rotation about z, and shapes."""
 
     name: str
     place: Vector
@@ -49,11 +44,16 @@ class Thing(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """The constant data of an object; `translation` is a handle, 0 if the object has no such field."""
+    """The constant data of an object.
+
+    `translation` is a handle, 0 if the object has no such field. `heading_rad` is None if the rotation about
+    z changes the outline, so that it is read each time.
+    """
 
     name: str
     node: int
     translation: int
+    heading_rad: float | None
     shapes: tuple[ObstacleShape, ...]
 
 
@@ -95,32 +95,61 @@ class ObstacleReader:
         for node in self._nodes(self._ask("supervisor/get_root", "get_uint64", ask=True).value, "children"):
             kind = self._kind(node)
             if kind in _FLOOR_FIELDS:
-                size = self._vector(node, _FLOOR_FIELDS[kind], "vec2f")
-                shape = ObstacleShape((0.0, 0.0, 0.0), (0.5 * size[0], 0.5 * size[1], 0.0), 0.0)
-                yield _Known(FLOOR, node, self._field(node, "translation"), (shape,))
+                x, y, _ = self._vector(node, _FLOOR_FIELDS[kind], "vec2f")
+                yield self._known(FLOOR, node, (PartFrame().box((x, y, 0.0)),))
             elif self._ask("supervisor/node/get_base_type_name", "node_get_name", node=node).name == "Solid":
-                shapes = tuple(self._shapes(node, "boundingObject", (0.0, 0.0, 0.0)))
+                shapes = tuple(self._shapes(node, "boundingObject", self._tilt(node)))
                 if shapes:
                     name = self._ask("supervisor/node/get_def", "node_get_name", node=node).name
-                    yield _Known(name, node, self._field(node, "translation"), shapes)
+                    yield self._known(name, node, shapes)
 
-    def _shapes(self, node: int, field: str, center: Vector) -> Iterator[ObstacleShape]:
+    def _known(self, name: str, node: int, shapes: tuple[ObstacleShape, ...]) -> _Known:
+        heading_rad = None
+        if name == FLOOR:
+            heading_rad = heading_of(self._turn(node))
+        elif all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in shapes):
+            heading_rad = 0.0
+        return _Known(name, node, self._field(node, "translation"), heading_rad, shapes)
+
+    def _shapes(self, node: int, field: str, frame: PartFrame) -> Iterator[ObstacleShape]:
         for child in self._nodes(node, field):
-            kind = self._kind(child)
-            if kind in _WRAPPERS:
-                inner = center
-                if kind in ("Pose", "Transform"):
-                    x, y, z = self._vector(child, "translation", "vec3f")
-                    inner = (center[0] + x, center[1] + y, center[2] + z)
-                yield from self._shapes(child, "geometry" if kind == "Shape" else "children", inner)
-            elif kind == "Box":
-                x, y, z = self._vector(child, "size", "vec3f")
-                yield ObstacleShape(center, (0.5 * x, 0.5 * y, 0.5 * z), 0.0)
-            elif kind in _ROUND:
-                radius_m = self._number(child, "radius")
-                height_m = 0.0 if kind == "Sphere" else self._number(child, "height")
-                ends_m = 0.0 if kind == "Cylinder" else radius_m
-                yield ObstacleShape(center, (0.0, 0.0, 0.5 * height_m + ends_m), radius_m)
+            match self._kind(child):
+                case "Shape":
+                    yield from self._shapes(child, "geometry", frame)
+                case "Group":
+                    yield from self._shapes(child, "children", frame)
+                case "Pose" | "Transform":
+                    yield from self._shapes(child, "children", self._inside(child, frame))
+                case "Box":
+                    yield frame.box(self._vector(child, "size", "vec3f"))
+                case "Cylinder":
+                    yield frame.cylinder(self._number(child, "radius"), self._number(child, "height"))
+                case "Capsule":
+                    yield frame.capsule(self._number(child, "radius"), self._number(child, "height"))
+                case "Sphere":
+                    yield frame.sphere(self._number(child, "radius"))
+
+    def _inside(self, node: int, frame: PartFrame) -> PartFrame:
+        """Return the frame of a Pose or Transform in `frame`."""
+        found = self._ask(
+            "supervisor/field/get_rotation", "field_get_rotation", field=self._field(node, "rotation")
+        ).value
+        turn = (found.x, found.y, found.z, found.w)
+        return frame.inside(self._vector(node, "translation", "vec3f"), turn, self._scale(node))
+
+    def _tilt(self, node: int) -> PartFrame:
+        """Return the frame of an object's parts, whose rotation about z is taken away."""
+        return tilt_of(self._turn(node), self._scale(node))
+
+    def _scale(self, node: int) -> Vector:
+        """Return the scale of a node; only a Transform and old forms of a Solid have this field."""
+        field = self._field(node, "scale")
+        return self._value(field, "vec3f") if field else (1.0, 1.0, 1.0)
+
+    def _turn(self, node: int) -> Turn:
+        answer = self._ask("supervisor/node/get_orientation", "node_get_orientation", node=node)
+        turn = answer.orientation
+        return (turn.x, turn.y, turn.z, turn.w)
 
     def _place(self, known: _Known) -> Vector:
         if not known.translation:
@@ -128,13 +157,7 @@ class ObstacleReader:
         return self._value(known.translation, "vec3f")
 
     def _heading(self, known: _Known) -> float:
-        if known.name == FLOOR:
-            return 0.0  # the sides of a floor are parallel to the axes of the world
-        if all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in known.shapes):
-            return 0.0  # a rotation about z does not change the outline
-        orientation = self._ask("supervisor/node/get_orientation", "node_get_orientation", node=known.node)
-        turn = orientation.orientation
-        return math.remainder(2.0 * math.atan2(turn.z, turn.w), 2.0 * math.pi)
+        return heading_of(self._turn(known.node)) if known.heading_rad is None else known.heading_rad
 
     def _nodes(self, node: int, name: str) -> list[int]:
         """Return the nodes in a field; [] if the node has no such field."""

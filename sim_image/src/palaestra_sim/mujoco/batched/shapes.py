@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from palaestra_protocol.batch import BatchShape
-from palaestra_sim.scene.geometry import Vector, to_quaternion
+from palaestra_protocol.obstacle_shapes import (
+    ObstacleShape,
+    PartFrame,
+    Turn,
+    Vector,
+    heading_of,
+    tilt_of,
+)
+from palaestra_sim.scene.geometry import axis_angle_to_quaternion, to_quaternion
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.tree.field_types import FieldType
 
 FLOOR: Final = "FLOOR"
 _FLOOR_FIELDS: Final = {"RectangleArena": "floorSize", "Floor": "size"}
-_ROUND: Final = ("Cylinder", "Capsule", "Sphere")
-_WRAPPERS: Final = ("Pose", "Transform", "Group", "Shape")
-_CENTER: Final = (0.0, 0.0, 0.0)
-
-
-class _Part(NamedTuple):
-    """A shape of an object: its center and half its size in the object's frame, and its radius."""
-
-    center: Vector
-    half: Vector
-    radius: float
 
 
 def shapes_of(simulation: Simulation) -> tuple[BatchShape, ...]:
@@ -41,16 +37,19 @@ class _Reader:
             kind = node.proto_name or node.type_name
             if kind in _FLOOR_FIELDS:
                 x, y = self._value(node, _FLOOR_FIELDS[kind], FieldType.VEC2F)
-                parts = [_Part(_CENTER, (0.5 * x, 0.5 * y, 0.0), 0.0)]
-                yield from self._shapes(FLOOR, node, parts)
+                yield from self._shapes(FLOOR, node, [PartFrame().box((x, y, 0.0))])
             elif node.type_name == "Solid":
-                parts = list(self._parts(node.nodes("boundingObject"), _CENTER))
+                tilt = tilt_of(_turn(node), self._scale(node))
+                parts = list(self._parts(node.nodes("boundingObject"), tilt))
                 yield from self._shapes(node.def_name, node, parts)
 
-    def _shapes(self, name: str, node: SceneNode, parts: list[_Part]) -> Iterator[BatchShape]:
+    def _shapes(self, name: str, node: SceneNode, parts: list[ObstacleShape]) -> Iterator[BatchShape]:
         x, y, z = self._value(node, "translation", FieldType.VEC3F)
-        heading_rad = 0.0 if name == FLOOR else _heading(node, parts)
-        for center, half, radius in parts:
+        heading_rad = 0.0
+        if name == FLOOR or not all(part.radius_m and part.center[:2] == (0.0, 0.0) for part in parts):
+            heading_rad = heading_of(_turn(node))
+        for part in parts:
+            center, half = part.center, part.half
             yield BatchShape(
                 name=name,
                 x=x,
@@ -63,34 +62,44 @@ class _Reader:
                 half_x=half[0],
                 half_y=half[1],
                 half_z=half[2],
-                radius=radius,
+                radius=part.radius_m,
             )
 
-    def _parts(self, nodes: tuple[SceneNode, ...], center: Vector) -> Iterator[_Part]:
+    def _parts(self, nodes: tuple[SceneNode, ...], frame: PartFrame) -> Iterator[ObstacleShape]:
         for node in nodes:
-            kind = node.proto_name or node.type_name
-            if kind in _WRAPPERS:
-                inner = center
-                if kind in {"Pose", "Transform"}:
-                    x, y, z = self._value(node, "translation", FieldType.VEC3F)
-                    inner = (center[0] + x, center[1] + y, center[2] + z)
-                yield from self._parts(node.nodes("geometry" if kind == "Shape" else "children"), inner)
-            elif kind == "Box":
-                x, y, z = self._value(node, "size", FieldType.VEC3F)
-                yield _Part(center, (0.5 * x, 0.5 * y, 0.5 * z), 0.0)
-            elif kind in _ROUND:
-                radius = self._value(node, "radius", FieldType.FLOAT)
-                height = 0.0 if kind == "Sphere" else self._value(node, "height", FieldType.FLOAT)
-                ends = 0.0 if kind == "Cylinder" else radius
-                yield _Part(center, (0.0, 0.0, 0.5 * height + ends), radius)
+            match node.proto_name or node.type_name:
+                case "Shape":
+                    yield from self._parts(node.nodes("geometry"), frame)
+                case "Group":
+                    yield from self._parts(node.nodes(), frame)
+                case "Pose" | "Transform":
+                    yield from self._parts(node.nodes(), self._inside(node, frame))
+                case "Box":
+                    yield frame.box(self._value(node, "size", FieldType.VEC3F))
+                case "Cylinder":
+                    yield frame.cylinder(self._number(node, "radius"), self._number(node, "height"))
+                case "Capsule":
+                    yield frame.capsule(self._number(node, "radius"), self._number(node, "height"))
+                case "Sphere":
+                    yield frame.sphere(self._number(node, "radius"))
+
+    def _inside(self, node: SceneNode, frame: PartFrame) -> PartFrame:
+        """Return the frame of a Pose or Transform in `frame`."""
+        turn = axis_angle_to_quaternion(self._value(node, "rotation", FieldType.ROTATION))
+        return frame.inside(self._value(node, "translation", FieldType.VEC3F), turn, self._scale(node))
+
+    def _scale(self, node: SceneNode) -> Vector:
+        field = self._simulation.tree.field_of(node, "scale", self._simulation)
+        return (1.0, 1.0, 1.0) if field is None else field.get(FieldType.VEC3F)
+
+    def _number(self, node: SceneNode, name: str) -> float:
+        return float(self._value(node, name, FieldType.FLOAT))
 
     def _value(self, node: SceneNode, name: str, type_: FieldType) -> Any:
         field = self._simulation.tree.field_of(node, name, self._simulation)
-        return _CENTER if field is None else field.get(type_)
+        return (0.0, 0.0, 0.0) if field is None else field.get(type_)
 
 
-def _heading(node: SceneNode, parts: list[_Part]) -> float:
-    if all(part.radius and part.center[:2] == (0.0, 0.0) for part in parts) or node.place is None:
-        return 0.0  # a rotation about z does not change the outline
-    _, _, z, w = to_quaternion(node.place.world_pose.rotation)
-    return math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
+def _turn(node: SceneNode) -> Turn:
+    """Return the orientation of a node, as a client reads it over ROS."""
+    return (0.0, 0.0, 0.0, 1.0) if node.place is None else to_quaternion(node.place.world_pose.rotation)
