@@ -12,6 +12,7 @@ from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.rays import bundles, origins_and_directions
 from palaestra_sim.mujoco.renderer import Renderer
 from palaestra_sim.mujoco.visual_model import PASSED, VisualModel
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.physics import Figure
 from palaestra_sim.scene.sensor_rays import Beam
 
@@ -28,9 +29,12 @@ class LidarBeams:
     beam, because a camera does not show the inner side of a surface either.
     """
 
-    def __init__(self, pictures: Renderer, figure: Figure, beams: Sequence[Beam]) -> None:
+    def __init__(
+        self, pictures: Renderer, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None
+    ) -> None:
         self._pictures = pictures
         self._figure = figure
+        self._mount = mount or figure.place
         self._reach = np.array([beam.reach_m for beam in beams])
         self._origins, self._directions = origins_and_directions(beams)
         self._bundles = bundles(self._origins)
@@ -39,7 +43,7 @@ class LidarBeams:
     def cast(self) -> list[float]:
         """Return the distance in meters that each beam travels now; at most the reach of the beam."""
         visible = self._pictures.placed()
-        pose = self._figure.place.world_pose
+        pose = self._mount.world_pose
         turned = np.array(pose.rotation).reshape(3, 3)
         origins = self._origins @ turned.T + pose.position
         directions = self._directions @ turned.T

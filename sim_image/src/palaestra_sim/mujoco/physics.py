@@ -137,9 +137,9 @@ class MujocoPhysics:
             link.forget()
         self._settled = False
 
-    def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+    def look(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function that computes the distance in meters that each beam of a robot travels now."""
-        bundle = Beams(figure, beams)
+        bundle = Beams(figure, beams, mount)
 
         def cast() -> Sequence[float]:
             self._settle()
@@ -147,9 +147,9 @@ class MujocoPhysics:
 
         return cast
 
-    def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+    def see(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
-        return LidarBeams(self._pictures, figure, beams).cast
+        return LidarBeams(self._pictures, figure, beams, mount).cast
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
         """Apply a force to a robot or a dynamic solid in the next basic step."""

@@ -12,6 +12,7 @@ import numpy as np
 from palaestra_sim.mujoco.geoms import SEEN
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import Built
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.physics import Figure
 from palaestra_sim.scene.sensor_rays import Beam
 
@@ -21,8 +22,9 @@ GROUPS: Final = np.array([int(group == SEEN) for group in range(mujoco.mjNGROUP)
 class Beams:
     """The beams of one robot; beams with the same origin are cast together."""
 
-    def __init__(self, figure: Figure, beams: Sequence[Beam]) -> None:
+    def __init__(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> None:
         self._figure = figure
+        self._mount = mount or figure.place
         self._reach = np.array([beam.reach_m for beam in beams])
         self._origins, self._directions = origins_and_directions(beams)
         self._distances = np.empty(len(beams))
@@ -31,7 +33,7 @@ class Beams:
 
     def cast(self, built: Built) -> list[float]:
         """Return the distance in meters that each beam travels; at most the reach of the beam."""
-        pose = self._figure.place.ground_pose
+        pose = self._mount.ground_pose
         turned = np.array(pose.rotation).reshape(3, 3)
         origins = self._origins @ turned.T + pose.position
         directions = self._directions @ turned.T

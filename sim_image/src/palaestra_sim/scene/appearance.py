@@ -30,6 +30,7 @@ from palaestra_protocol.scene import (
 )
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector, to_quaternion
+from palaestra_sim.scene.links import frames_between
 from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.meshes import box_of
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -169,7 +170,7 @@ class Appearance:
         if self._view.changes != self._changes:
             self._collect()
         elif self._view.moves != self._moves:
-            if any(_offset(place, carrier) != pose for place, carrier, pose in self._offsets):
+            if any(frames_between(carrier, place) != pose for place, carrier, pose in self._offsets):
                 self._collect()
             now = self._resting()
             self._elsewhere = {name: pose for name, pose in now.items() if pose != self._starts[name]}
@@ -187,7 +188,7 @@ class Appearance:
                 by_frame[carrier] = _Node(names.get(carrier, ""), carrier)
             by_frame[carrier].shapes.append(thing)
             if thing.place is not None and carrier is not None and carrier is not thing.place:
-                self._offsets.append((thing.place, carrier, _offset(thing.place, carrier)))
+                self._offsets.append((thing.place, carrier, frames_between(carrier, thing.place)))
         self._nodes = sorted(by_frame.values(), key=lambda node: _depth(node.frame))
         _make_unique(self._nodes)
         axes = next((it.place.axes for it in things if it.place is not None), None)
@@ -256,17 +257,6 @@ def _carrier(place: Frame) -> Frame:
     return next((frame for frame in place.chain() if frame.moves), place)
 
 
-def _offset(place: Frame, carrier: Frame) -> Pose:
-    """Return the pose of a frame in an outer frame; its bits do not depend on the outer frame's pose."""
-    pose = Pose()
-    for frame in place.chain():
-        if frame is carrier:
-            break
-        inner = frame.pose if frame.parent is None else frame.pose.scaled(frame.parent.scale)
-        pose = inner.after(pose)
-    return pose
-
-
 def _depth(frame: Frame | None) -> int:
     return 0 if frame is None else sum(1 for _ in frame.chain())
 
@@ -296,7 +286,7 @@ def _shape(thing: Drawn, carrier: Frame | None, table: MeshTable) -> VisualShape
             pose = pose.after(Pose(_scaled(middle, size)))
             size = _scaled(around, size)
     if thing.place is not None and carrier is not None and thing.place is not carrier:
-        pose = _offset(thing.place, carrier).after(pose)
+        pose = frames_between(carrier, thing.place).after(pose)
     return VisualShape(kind=kind, size=size, pose=pose_numbers(pose), color=thing.color, mesh=index)
 
 

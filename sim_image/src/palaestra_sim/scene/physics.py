@@ -122,11 +122,14 @@ class Physics(Protocol):
         """Discard internal data of earlier steps: the motion then depends only on state and commands."""
         ...
 
-    def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns the distance in meters that each beam of a robot travels."""
+    def look(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
+        """Return a function that returns the distance in meters that each beam of a robot travels.
+
+        The beams are in the frame `mount`, which a joint moves; without it, they are in the robot's frame.
+        """
         ...
 
-    def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+    def see(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
         ...
 

@@ -46,6 +46,7 @@ class Robot:
         body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
             obstacle.
         time_s: the time of the world since its start or its last reset.
+        resets: the number of resets of the world.
         powered: whether the motors have energy to turn.
         links: the parts on the robot's joints that forces move.
         battery: the battery; its value is -1 if the robot has no battery.
@@ -62,6 +63,7 @@ class Robot:
         self.body: Body | None = parts.body
         self.battery = Battery(parts.node)
         self.time_s = 0.0
+        self.resets = 0
         self.powered = True
         self._has_battery = self.battery.value >= 0.0
         self.seed = random_seed
@@ -93,17 +95,17 @@ class Robot:
     def custom_data(self, text: str) -> None:
         self.parts.node.fields["customData"] = FieldContent([text])
 
-    def look(self, beams: Sequence[Beam]) -> Cast:
+    def look(self, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function that returns the distance that each beam travels; see `Carrier`."""
-        return self._physics.look(self, beams)
+        return self._physics.look(self, beams, mount)
 
-    def see(self, beams: Sequence[Beam]) -> Cast:
+    def see(self, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function like `look`; but the beams stop at visible shapes; see `Carrier`."""
-        return self._physics.see(self, beams)
+        return self._physics.see(self, beams, mount)
 
-    def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
+    def reflect(self, beams: Sequence[Beam], mount: Frame | None = None) -> Callable[[], Sequence[Glance]]:
         """Return a function that returns the surface that each infra-red beam meets; see `Carrier`."""
-        return VisualRays(self._view, self.place, beams, textures=True).cast
+        return VisualRays(self._view, self.place, beams, mount, textures=True).cast
 
     def lights(self) -> Sequence[SceneNode]:
         """Return the current lights of the world; see `Carrier`."""
@@ -153,6 +155,7 @@ class Robot:
         """Stop, and return pose, motors, battery and noise to their start; customData is kept."""
         self.battery.reset()
         self.time_s = 0.0
+        self.resets += 1
         self.powered = True
         self.place.return_to_start()
         for motor in self.motors.values():

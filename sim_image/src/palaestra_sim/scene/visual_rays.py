@@ -41,14 +41,24 @@ class VisualRays:
     Args:
         view: the visible part of the world.
         carrier: the frame of the robot.
-        beams: the rays, in the frame of the robot.
+        beams: the rays, in the frame `mount`.
+        mount: a frame on the robot, which a joint moves; None for the frame of the robot.
         textures: whether textures affect the reflection.
     """
 
-    def __init__(self, view: View, carrier: Frame, beams: Sequence[Beam], *, textures: bool = False) -> None:
+    def __init__(
+        self,
+        view: View,
+        carrier: Frame,
+        beams: Sequence[Beam],
+        mount: Frame | None = None,
+        *,
+        textures: bool = False,
+    ) -> None:
         self._view = view
         self._textures = textures
         self._carrier = carrier
+        self._mount = mount or carrier
         self._bundles = [
             (origin, [(direction, reach_m) for _, direction, reach_m in rays])
             for origin, rays in groupby(map(_ray, beams), key=itemgetter(0))
@@ -63,7 +73,7 @@ class VisualRays:
         for target in self._moving:
             target.place()
         targets = [*self._standing, *self._moving]
-        pose = self._carrier.world_pose
+        pose = self._mount.world_pose
         return [glance for origin, rays in self._bundles for glance in _bundle(targets, pose, origin, rays)]
 
     def _refresh(self) -> None:

@@ -118,24 +118,24 @@ class StubPhysics:
     def reset(self) -> None:
         """Do nothing: the physics has no state besides the state of the bodies."""
 
-    def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+    def look(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function that computes the distance in meters that each beam of a robot travels now."""
         place, body = figure.place, figure.body
-        if not isinstance(body, StubBody) or any(not beam.level for beam in beams):
+        if mount or not isinstance(body, StubBody) or any(not beam.level for beam in beams):
             sloped = SlopedBeams(beams)
             self._sloped.setdefault(figure, []).append(sloped)
-            if isinstance(body, StubBody):
+            if isinstance(body, StubBody) and not mount:
                 return lambda: sloped.cast(body.frame, place.height_m)
-            return lambda: sloped.cast_from(place.ground_pose)
+            return lambda: sloped.cast_from((mount or place).ground_pose)
         fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
         heights = [beam.height_m for beam in beams]
         level = _Level(fan, (min(heights), max(heights)), SlopedBeams(beams))
         self._level.setdefault(figure, []).append(level)
         return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
-    def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+    def see(self, figure: Figure, beams: Sequence[Beam], mount: Frame | None = None) -> Cast:
         """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
-        sight = VisualRays(self._view, figure.place, beams)
+        sight = VisualRays(self._view, figure.place, beams, mount)
         return lambda: [glance.distance_m for glance in sight.cast()]
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:

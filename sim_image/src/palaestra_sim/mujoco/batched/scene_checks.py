@@ -74,6 +74,8 @@ def _lack_of_device(robot: Robot, device: object, node: str) -> str:
             return "" if wheel and device.spec.max_torque_nm else f"the {node}"
         case DistanceSensor():
             simple = device.type in _SIMPLE and len(device.beams) == 1
+            if simple and device.mount is not None:
+                return "the DistanceSensor on a joint"
             return "" if simple else "the infra-red sensor, sonar or DistanceSensor with several rays"
         case TouchSensor():
             return "" if device.link is None else "the TouchSensor of a force"

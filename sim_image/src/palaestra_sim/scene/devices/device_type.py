@@ -14,9 +14,9 @@ from palaestra_sim.ros_interfaces import Fields, Row, is_ros_name, topic_name
 from palaestra_sim.scene.bodies import Body
 from palaestra_sim.scene.camera_interface import CameraInterface, Lens
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import Vector
-from palaestra_sim.scene.joints import Joint
-from palaestra_sim.scene.links import Link
+from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.joints import Joint, JointFrame
+from palaestra_sim.scene.links import Link, frames_between
 from palaestra_sim.scene.motion import Motion
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -99,6 +99,15 @@ class DevicePart:
     measured: list[Link]
     forces: bool
 
+    @property
+    def mount(self) -> Frame | None:
+        """The frame of the innermost joint around the device; None if no joint moves the device."""
+        return next((frame for frame in self.place.chain() if isinstance(frame, JointFrame)), None)
+
+    def mounted(self, place: Frame) -> Pose:
+        """Return the pose of a frame of the device in its mount; without a mount, in the robot's frame."""
+        return place.world_pose if self.mount is None else frames_between(self.mount, place)
+
     def number(self, name: str, default: float) -> float:
         """Return the number of a field; `default` if the field is refused."""
         return self.reading.number(self.node, name, default)
@@ -153,25 +162,30 @@ class Carrier(Protocol):
         body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
             obstacle.
         time_s: the time of the world since its start or its last reset.
+        resets: the number of resets of the world.
     """
 
     body: Body | None
     time_s: float
+    resets: int
 
     def gauss(self, mean: float, deviation: float, /) -> float:
         """Return the next number of the robot's own noise."""
         ...
 
-    def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return a function that returns the distance in meters that each beam travels."""
+    def look(self, beams: Sequence[Beam], mount: Frame | None = None) -> Callable[[], Sequence[float]]:
+        """Return a function that returns the distance in meters that each beam travels.
+
+        The beams are in the frame `mount`; without it, they are in the robot's frame.
+        """
         ...
 
-    def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+    def see(self, beams: Sequence[Beam], mount: Frame | None = None) -> Callable[[], Sequence[float]]:
         """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
         ...
 
-    def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
-        """Return a function that returns the surface that each infra-red beam meets."""
+    def reflect(self, beams: Sequence[Beam], mount: Frame | None = None) -> Callable[[], Sequence[Glance]]:
+        """Return a function that returns the surface that each infra-red beam meets; see `look`."""
         ...
 
     def lights(self) -> Sequence[SceneNode]:

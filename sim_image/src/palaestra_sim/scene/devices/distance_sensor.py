@@ -16,17 +16,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import islice
-from typing import Final
+from typing import Final, TypeVar
 
 from palaestra_sim.ros_interfaces import Row
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
 from palaestra_sim.scene.devices.sensor_response import discrete, table_rows, table_service
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
 from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
+T = TypeVar("T")
+
+_LEAST_RAD: Final = 1e-9  # replaces a width of 0, which is refused
 _MOST_RAYS: Final = 10_000  # maximum number of rays of a sensor, because each ray is cast at every step
 _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
 _BEAMS_OF_SONAR: Final = 5  # number of beams for each ray of a sonar
@@ -75,6 +79,8 @@ class DistanceSensor:
     A sonar has five beams for each ray: the ray itself, and two pairs of beams next to it.
 
     Attributes:
+        beams: the rays, in the frame of the mount.
+        mount: the frame of the joint that moves the sensor; None if no joint moves it.
         rows: the rows of the lookup table, as in the world.
         sensitivity: the effect of the color on an infra-red sensor; 0 for no effect.
         resolution: the resolution of the value; -1 for exact values.
@@ -87,6 +93,7 @@ class DistanceSensor:
     table: LookupTable
     type: DistanceSensorType
     aperture_rad: float
+    mount: Frame | None = None
     rows: tuple[TableRow, ...] = ()
     sensitivity: float = 1.0
     resolution: float = -1.0
@@ -109,8 +116,9 @@ def _read(part: DevicePart) -> DistanceSensor:
     return DistanceSensor(
         name=part.name,
         model=part.text("model"),
-        beams=tuple(_beams(part.place.world_pose, cone, table.reach_m, sonar=type_name == "sonar")),
-        weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
+        mount=part.mount,
+        beams=tuple(_beams(part.mounted(part.place), cone, table.reach_m, sonar=type_name == "sonar")),
+        weights=_weights(part, cone, aperture_rad),
         table=table,
         rows=rows,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
@@ -121,7 +129,7 @@ def _read(part: DevicePart) -> DistanceSensor:
 
 
 def _beams(pose: Pose, cone: Sequence[Vector], reach_m: float, *, sonar: bool) -> Iterator[Beam]:
-    """Yield the beams of a sensor's rays; `pose` is the pose of the sensor in the robot's frame."""
+    """Yield the beams of a sensor's rays; `pose` is the pose of the sensor in its mount."""
     for direction in cone:
         yield beam_along(pose, direction, reach_m)
         if sonar:
@@ -171,12 +179,19 @@ def _direction(alpha: float, theta: float) -> Vector:
     return math.cos(theta), math.sin(theta) * math.sin(alpha), -math.sin(theta) * math.cos(alpha)
 
 
-def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
+def _weights(part: DevicePart, cone: Sequence[Vector], aperture_rad: float) -> tuple[float, ...]:
     """Return the share of each ray in the average: a normal distribution over its angle to the axis."""
+    given = part.number("gaussianWidth", 1.0)
     if len(cone) == 1:
         return (1.0,)
+    width_rad = abs(given * aperture_rad) or _LEAST_RAD
     weights = [math.exp(-((math.acos(min(1.0, x)) / width_rad) ** 2)) for x, _, _ in cone]
     total = sum(weights)
+    if not total or not given:
+        part.refuse(
+            f"with the gaussianWidth {given:g}, no ray has a weight", "write a larger number, such as 1"
+        )
+        return (1.0 / len(cone),) * len(cone)
     return tuple(weight / total for weight in weights)
 
 
@@ -199,7 +214,7 @@ def _fine(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     """Return the sample function of sensors, before their resolutions are applied."""
     if any(sensor.type is DistanceSensorType.INFRA_RED for sensor in sensors):
         return _with_infrared(sensors, robot)
-    cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
+    cast = _together(robot.look, sensors)
     gauss = robot.gauss
 
     if all(len(sensor.beams) == 1 for sensor in sensors):
@@ -225,8 +240,8 @@ def _with_infrared(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     others = [it for it in sensors if it.type is not DistanceSensorType.INFRA_RED]
     cast: Callable[[], Sequence[float]] = tuple
     if others:
-        cast = robot.look([beam for sensor in others for beam in sensor.beams])
-    reflect = robot.reflect([beam for sensor in infrared for beam in sensor.beams])
+        cast = _together(robot.look, others)
+    reflect = _together(robot.reflect, infrared)
     gauss = robot.gauss
 
     def sample() -> None:
@@ -240,6 +255,26 @@ def _with_infrared(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
             sensor.value = sensor.table.response(measured_m, gauss)
 
     return sample
+
+
+def _together(
+    cast: Callable[[Sequence[Beam], Frame | None], Callable[[], Sequence[T]]],
+    sensors: Sequence[DistanceSensor],
+) -> Callable[[], Sequence[T]]:
+    """Return a function that casts the beams of all sensors; the sensors on a mount are cast together."""
+    mounts = dict.fromkeys(sensor.mount for sensor in sensors)
+    casts = {
+        mount: cast([beam for it in sensors if it.mount is mount for beam in it.beams], mount)
+        for mount in mounts
+    }
+    if len(casts) == 1:
+        return next(iter(casts.values()))
+
+    def cast_all() -> Sequence[T]:
+        found = {mount: iter(cast_of()) for mount, cast_of in casts.items()}
+        return [it for sensor in sensors for it in islice(found[sensor.mount], len(sensor.beams))]
+
+    return cast_all
 
 
 def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:

@@ -23,6 +23,7 @@ from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceT
 from palaestra_sim.scene.devices.lidar_rays import LidarRays
 from palaestra_sim.scene.devices.sensor_response import discrete
 from palaestra_sim.scene.devices.step_timer import StepTimer
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.old_axes import looking
 
@@ -53,6 +54,7 @@ class Lidar:
         noise: standard deviation of a distance, as a fraction of the maximum range.
         resolution: the resolution of a distance; -1 for exact values.
         rays: the rays of the lidar.
+        mount: the frame of the joint that moves the lidar; None if no joint moves it.
         period_ms: the sampling period; 0 while the lidar is not enabled.
         clouded: whether the point cloud is enabled.
         layers: the distances of the last step in meters, by layer.
@@ -66,6 +68,7 @@ class Lidar:
     noise: float
     resolution: float
     rays: LidarRays
+    mount: Frame | None = None
     period_ms: int = 0
     clouded: bool = False
     layers: list[array[float]] = field(default_factory=list)
@@ -138,7 +141,7 @@ def _read(part: DevicePart) -> Lidar:
         "maxRange": number("maxRange", 1.0),
     }
     rays = LidarRays(
-        frame=looking(part.node, part.place).world_pose,
+        frame=part.mounted(looking(part.node, part.place)),
         layers=layers,
         columns=columns,
         wide_rad=info["fov"],
@@ -159,6 +162,7 @@ def _read(part: DevicePart) -> Lidar:
         noise=number("noise", 0.0),
         resolution=number("resolution", -1.0),
         rays=rays,
+        mount=part.mount,
         layers=_unseen(rays),
     )
 
@@ -186,7 +190,8 @@ def _fixed(lidar: Lidar, robot: Carrier) -> Sample:
             return
         if not casts:  # many rays take memory, so they are created at the first use of the lidar
             columns = range(lidar.rays.columns)
-            casts.extend(robot.see(lidar.rays.beams(layer, columns)) for layer in range(lidar.rays.layers))
+            layers = [lidar.rays.beams(layer, columns) for layer in range(lidar.rays.layers)]
+            casts.extend(robot.see(beams, lidar.mount) for beams in layers)
         for layer, cast in enumerate(casts):
             lidar.layers[layer] = array("f", (_seen(lidar, distance_m, robot.gauss) for distance_m in cast()))
 
@@ -216,7 +221,7 @@ def _sweep(lidar: Lidar, robot: Carrier, before: float, turns: float) -> None:
     columns = [column % rays.columns for column in range(max(first, end - rays.columns), end)]
     beams = [beam for layer in range(rays.layers) for beam in rays.beams(layer, columns)]
     places = ((layer, column) for layer in range(rays.layers) for column in columns)
-    for (layer, column), distance_m in zip(places, robot.see(beams)(), strict=True):
+    for (layer, column), distance_m in zip(places, robot.see(beams, lidar.mount)(), strict=True):
         lidar.layers[layer][column] = _seen(lidar, distance_m, robot.gauss)
 
 

@@ -1,4 +1,4 @@
-"""The rays of a lidar: their directions, and their beams in the frame of the robot. Pure.
+"""The rays of a lidar: their directions, and their beams in the frame of the mount. Pure.
 
 Source: WbLidar.cpp of Webots.
 """
@@ -18,7 +18,7 @@ class LidarRays:
     """The rays of a lidar by layer and column.
 
     Attributes:
-        frame: the pose of the sensor in the robot's frame; the sensor looks along x, with z up.
+        frame: the pose of the sensor in its mount; the sensor looks along x, with z up.
         layers: the number of layers, from the top down.
         columns: the number of rays in each layer.
         wide_rad: the angle over which a fixed lidar spreads the rays of a layer.
@@ -45,7 +45,7 @@ class LidarRays:
         return self._known[layer]
 
     def beams(self, layer: int, columns: Iterable[int]) -> list[Beam]:
-        """Return some rays of a layer in the frame of the robot."""
+        """Return some rays of a layer in the frame of the mount."""
         directions = self.layer(layer)
         return [beam_along(self.frame, directions[column], self.reach_m) for column in columns]
 
