@@ -280,6 +280,37 @@ def test_a_state_of_a_node_is_saved_and_loaded(load):
         simulation.load_state(cart, "other")
 
 
+def test_a_state_has_the_poses_of_bodies_without_joints(load):
+    """A supervisor may move such a body, for example a target, so a loaded state returns it too."""
+    hand = '<body name="hand" mocap="true" pos="0 2 1"><geom size="0.1" contype="0" conaffinity="0"/></body>'
+    simulation = load(FORCE, "", ('<body name="target"', hand + '<body name="target"'))
+    root, of_def = simulation.tree.root, simulation.tree.of_def
+    starts = [of_def(name).place.world_position for name in ("target", "hand")]
+    simulation.save_state(root, "start")
+    for state in ("__init__", "start"):
+        for name in ("target", "hand"):
+            field = simulation.tree.field_of(of_def(name), "translation", simulation)
+            field.set(FieldType.VEC3F, 0, (5.0, 5.0, 5.0))
+        simulation.step(10)
+        assert of_def("hand").place.world_position == (5.0, 5.0, 5.0)
+
+        simulation.load_state(root, state)
+
+        assert [of_def(name).place.world_position for name in ("target", "hand")] == starts
+
+
+def test_a_contact_of_a_cloth_is_that_of_its_own_body(load):
+    """A flex has no geom; its contacts were those of the last geom of the model."""
+    cloth = """<flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" dim="2" mass="0.1"
+      pos="6 6 0.02" radius="0.01"><contact selfcollide="none"/></flexcomp>"""
+    simulation = load(FORCE, "", ('<body name="target"', cloth + '<body name="target"'))
+    simulation.step(500)
+    of_def = simulation.tree.of_def
+
+    assert simulation.contact_points(of_def("target"), descendants=True) == []
+    assert len(simulation.contact_points(of_def("cloth_3"), descendants=False)) == 1
+
+
 def test_the_same_follows_from_a_loaded_state_each_time(load):
     """The results are bitwise equal, because the solver keeps no value from the time before."""
     simulation = load()

@@ -26,18 +26,12 @@ class OutlineObservers:
         self._radars = tuple(it for it in every if isinstance(it, Radar))
         self._shaded = tuple(it for it in every if isinstance(it, LightSensor) and it.occlusion)
 
-    def show(
-        self,
-        nodes: Collection[SceneNode],
-        floors_m: Callable[[], tuple[float, ...]],
-        now_ms: Callable[[], int],
-    ) -> None:
+    def show(self, nodes: Collection[SceneNode], floors_m: Callable[[], tuple[float, ...]]) -> None:
         """Give the devices the current outlines of the world.
 
         Args:
             nodes: all nodes of the world.
             floors_m: returns the heights of the floors in meters.
-            now_ms: returns the simulated time in milliseconds.
         """
         if not (self._radars or self._shaded):
             return
@@ -47,4 +41,4 @@ class OutlineObservers:
         if self._radars:
             echoes = echoes_of(nodes, outlines)
             for radar in self._radars:
-                radar.show(echoes, now_ms)
+                radar.show(echoes)

@@ -303,9 +303,11 @@ class Simulation:
         """
         self._states.load(node, name)
         self._view.moves += 1
-        for robot in self.robots:
-            if robot.parts.node in {node, *node.descendants(), *node.ancestors()}:
-                robot.halt()
+        around = {node, *node.descendants(), *node.ancestors()}
+        halts = [robot.halt for robot in self.robots if robot.parts.node in around]
+        halts += [thing.place.halt for thing in self.scene.loose if thing.node in around]
+        for halt in halts:
+            halt()
         self._solids_moved = True
         self._arrange()
 
@@ -330,12 +332,11 @@ class Simulation:
         self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
 
     def _show_outlines(self) -> None:
-        floors_m = self.scene.surroundings.floors_m
-        self._observers.show(self.tree.nodes.values(), floors_m, lambda: self.time_ms)
+        self._observers.show(self.tree.nodes.values(), self.scene.surroundings.floors_m)
 
     def _resize(self, node: SceneNode) -> None:
         """Read the outline of an obstacle again, because a part of it has a new size."""
-        owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
+        owner = next((around for around in node.ancestors() if around.place is not None), None)
         if owner is not None and owner.place is not None:
             fresh = bounding_shapes(NodeReader(mesh_files=self.tree.mesh_files), owner, owner.place)
             solids = self.scene.solids
@@ -346,8 +347,8 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Frame) -> None:
-        """Arrange the world again if `place` carries a solid or floor, or if a robot's height has changed."""
-        places = [shape.place for shape in self.scene.solids]
+        """Arrange the world again if `place` carries a part of it, or if a robot's height has changed."""
+        places = [shape.place for shape in self.scene.solids] + [door.place for door in self.scene.doors]
         places += [floor.place for floor in self.scene.surroundings.floors]
         lifted = self._heights != self._heights_now()
         if lifted or any(place in moving.chain() for moving in places):

@@ -93,6 +93,23 @@ class Model:
         first = int(self.model.body_jntadr[body])
         return range(first, first + int(self.model.body_jntnum[body]))
 
+    def bodies_of_contact(self, index: int) -> tuple[int, ...]:
+        """Return the bodies of the two sides of a contact; a side may be a vertex of a flex."""
+        contact = self.data.contact[index]
+        sides = zip(contact.geom, contact.flex, contact.elem, contact.vert, strict=True)
+        return tuple(
+            int(self.model.geom_bodyid[geom]) if geom >= 0 else self._body_of_flex(flex, element, vertex)
+            for geom, flex, element, vertex in sides
+        )
+
+    def _body_of_flex(self, flex: int, element: int, vertex: int) -> int:
+        """Return the body of a vertex of a flex, or of the first vertex of an element."""
+        model = self.model
+        if vertex < 0:
+            width = int(model.flex_dim[flex]) + 1
+            vertex = int(model.flex_elem[model.flex_elemdataadr[flex] + width * element])
+        return int(model.flex_vertbodyid[model.flex_vertadr[flex] + vertex])
+
     def free_joint_of(self, body: int) -> int | None:
         """Return the number of the free joint of a body; None if it has no free joint."""
         return next((it for it in self.joints_of(body) if self.model.jnt_type[it] == FREE), None)

@@ -162,11 +162,10 @@ class MjcfSimulation:
         asked = {node, *node.descendants()} if descendants else {node}
         touching = {self._nodes.bodies[it]: it.number for it in asked if it in self._nodes.bodies}
         contacts = self._model.data.contact
-        bodies = self._model.model.geom_bodyid
         return [
             ((x, y, z), touching[body])
-            for geoms, (x, y, z) in zip(contacts.geom, contacts.pos.tolist(), strict=True)
-            for body in bodies[geoms].tolist()
+            for index, (x, y, z) in enumerate(contacts.pos.tolist())
+            for body in self._model.bodies_of_contact(index)
             if body in touching
         ]
 

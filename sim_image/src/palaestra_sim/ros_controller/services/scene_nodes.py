@@ -190,7 +190,7 @@ class NodeServices:
     def _get_field_by_index(self, request: Any) -> Fields:
         node = self._node(request)
         names = list(kinds_of(node))
-        if not _has_fields(node, request) or request.index >= len(names):
+        if not _has_fields(node, request) or not 0 <= request.index < len(names):
             return {"field": 0}
         field = self._handles.field_of(node, names[request.index])
         return {"field": self._handles.of(field)}

@@ -14,6 +14,7 @@ from typing import Final
 
 from palaestra_sim.ros_interfaces import Fields, Row
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.step_timer import StepTimer
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -100,9 +101,7 @@ class Radar:
     seen: list[Echo] = field(default_factory=list)
     _echoes: RadarTargets = field(default_factory=RadarTargets)
     _robot: frozenset[SceneNode] = frozenset()
-    _now_ms: Callable[[], int] = field(default=lambda: 0)
     _enabled: bool = False
-    _before_ms: int = 0
     _before: dict[Frame, Vector] = field(default_factory=dict)
 
     @property
@@ -110,9 +109,9 @@ class Radar:
         """The targets of the last sample, as messages."""
         return [echo.message() for echo in self.seen]
 
-    def show(self, echoes: RadarTargets, now_ms: Callable[[], int]) -> None:
-        """Set the targets of the world; `now_ms` returns the simulated time."""
-        self._echoes, self._now_ms = echoes, now_ms
+    def show(self, echoes: RadarTargets) -> None:
+        """Set the targets of the world."""
+        self._echoes = echoes
         self._robot = robot_around(self.node)
 
     def enabled(self, period_ms: int) -> None:
@@ -121,17 +120,20 @@ class Radar:
         self._before = {}
         self.seen = []
 
-    def sample(self, gauss: _Gauss) -> None:
-        """Detect the current targets if the radar is enabled; `gauss` draws the noise."""
+    def sample(self, gauss: _Gauss, passed_s: float) -> None:
+        """Detect the current targets if the radar is enabled.
+
+        Args:
+            gauss: draws the noise.
+            passed_s: seconds since the last sample; 0 after a reset, which is no motion.
+        """
         if not self._enabled:
             return
         targets = [it for it in self._echoes.targets if it.place is not self.place]
-        passed_s = (self._now_ms() - self._before_ms) / 1000.0
         echoes = (self._echo(target, passed_s, gauss) for target in targets)
         self.seen = merged([echo for echo in echoes if echo is not None], self.limits.cell)
         places = (self.place, *(target.place for target in targets))
         self._before = {place: place.ground_pose.position for place in places}
-        self._before_ms = self._now_ms()
 
     def _echo(self, target: RadarTarget, passed_s: float, gauss: _Gauss) -> Echo | None:
         """Return a target in its current state; None if it is not detected."""
@@ -261,11 +263,12 @@ def _watts(power_dbm: float) -> float:
 
 
 def _sampler(radars: Sequence[Radar], robot: Carrier) -> Sample:
-    gauss = robot.gauss
+    timer, gauss = StepTimer(robot), robot.gauss
 
     def sample() -> None:
+        elapsed_s, reset = timer.elapsed()
         for radar in radars:
-            radar.sample(gauss)
+            radar.sample(gauss, 0.0 if reset else elapsed_s)
 
     return sample
 

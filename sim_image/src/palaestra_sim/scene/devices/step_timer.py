@@ -13,9 +13,12 @@ class StepTimer:
 
     robot: Carrier
     _at_s: float = 0.0
+    _resets: int = 0
 
     def elapsed(self) -> tuple[float, bool]:
         """Return the seconds since the last call, and whether the world was reset meanwhile."""
-        now, before = self.robot.time_s, self._at_s
-        self._at_s = now
-        return (now, True) if now < before else (now - before, False)
+        robot, before_s, resets = self.robot, self._at_s, self._resets
+        self._at_s, self._resets = robot.time_s, robot.resets
+        if robot.resets != resets:
+            return robot.time_s, True
+        return robot.time_s - before_s, False

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from palaestra_sim.errors import SimError
 from palaestra_sim.scene.geometry import AxisAngle
+from palaestra_sim.scene.joints import JointFrame
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.scene.tree.field_types import WIDTH, FieldKind, FieldType
 from palaestra_sim.scene.tree.write_rules import require_admitted, require_effect
@@ -52,6 +53,7 @@ class NodeField:
         self.name = name
         self.kind = kind
         self._changes = changes
+        self._read = node.fields.get(name)  # the content from which `_values` was made
         self._values = _initial(node, name, kind)
         self._writes = 0  # pending writes, which the simulation has not yet applied
 
@@ -91,9 +93,7 @@ class NodeField:
         self._require_effect()
         require_admitted(self.node, self.name, value)
         values[at] = value
-        self._values = values
-        self._writes += 1
-        self._changes.before_next_step(self._take_effect)
+        self._write(values)
 
     def room(self, index: int) -> int | None:
         """Return the position for a node inserted at `index` (-1: the end); None if that is impossible."""
@@ -110,12 +110,14 @@ class NodeField:
         Raises:
             UnsimulatedError: the inserted value would have no effect.
         """
-        size = len(self._values)
+        values = list(self._current())
+        size = len(values)
         fits = self.kind.multiple and type_ is self.kind.type and -size - 1 <= index <= size
         if not fits or not _acceptable(type_, value):
             return False
         self._require_effect()
-        self._values.insert(index if index >= 0 else size + 1 + index, value)
+        values.insert(index if index >= 0 else size + 1 + index, value)
+        self._write(values)
         return True
 
     def remove(self, index: int) -> bool:
@@ -124,13 +126,21 @@ class NodeField:
         Raises:
             UnsimulatedError: the removal would have no effect.
         """
-        size = len(self._values)
+        values = list(self._current())
+        size = len(values)
         removable = self.kind.multiple and self.kind.type is not FieldType.NODE
         if not removable or not -size <= index < size:
             return False
         self._require_effect()
-        del self._values[index]
+        del values[index]
+        self._write(values)
         return True
+
+    def _write(self, values: list[Any]) -> None:
+        """Set the values for reads from now on, and for the simulation at the next basic step."""
+        self._values = values
+        self._writes += 1
+        self._changes.before_next_step(self._take_effect)
 
     def _require_effect(self) -> None:
         require_effect(self.node, self.name)
@@ -140,15 +150,11 @@ class NodeField:
         if self.kind.type is FieldType.NODE:
             return _initial(self.node, self.name, self.kind)
         if self._writes == 0:
-            place = self.node.place
-            if place is not None and self.name == "translation":
-                return [place.translation]
-            if place is not None and self.name == "rotation":
-                return [place.rotation]
-            if self.name == "customData":
-                return [self.node.text("customData") or ""]
-            if self.name == "battery":
-                return list(self.node.numbers("battery") or ())
+            if (live := _live(self.node, self.name)) is not None:
+                return live
+            written = self.node.fields.get(self.name)
+            if written is not self._read:  # another NodeField of the node, or of its twin, was written
+                self._read, self._values = written, _initial(self.node, self.name, self.kind)
         return self._values
 
     def _take_effect(self) -> None:
@@ -158,6 +164,32 @@ class NodeField:
             for twin in self.node.twins:
                 twin.fields[self.name] = FieldContent(_flat(self._values), bracketed=self.kind.multiple)
                 self._changes.changed(twin, self.name)
+
+
+def _live(node: SceneNode, name: str) -> list[Any] | None:
+    """Return the values of a field that changes by itself; None for any other field."""
+    place = node.place
+    match name:
+        case "translation" if place is not None:
+            return [place.translation]
+        case "rotation" if place is not None:
+            return [place.rotation]
+        case "customData":
+            return [node.text("customData") or ""]
+        case "battery":
+            return list(node.numbers("battery") or ())
+        case "position" if (end := _end_of(node)) is not None:
+            return [end.joint.now]
+    return None
+
+
+def _end_of(node: SceneNode) -> JointFrame | None:
+    """Return the end of the joint whose first `jointParameters` are `node`."""
+    joint = node.parent
+    if joint is None or node not in joint.nodes("jointParameters"):
+        return None
+    places = (end.place for end in joint.nodes("endPoint"))
+    return next((place for place in places if isinstance(place, JointFrame)), None)
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:

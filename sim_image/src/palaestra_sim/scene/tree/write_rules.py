@@ -94,9 +94,10 @@ def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> Non
     outline = field == "boundingObject"
     if not any(outline or _acts(inside) for it in added for inside in (it, *it.descendants())):
         return
-    if node.type_name == "Robot" or _on_robot(node):
+    if node.type_name == "Robot" or _is_carried(node) or _moves_by_itself(node):
         raise UnsimulatedError(
-            f"a {added[0].type_name} that affects the simulation cannot be added to a robot; {_ELSEWHERE}"
+            f"a {added[0].type_name} that affects the simulation cannot be added to a robot, or to a Solid"
+            f" that moves; {_ELSEWHERE}"
         )
     if field != "children":
         raise UnsimulatedError(
@@ -115,9 +116,10 @@ def require_removable(node: SceneNode) -> None:
         raise UnsimulatedError(f"the {node.type_name} of a world cannot be removed; keep it")
     if node.outline:
         raise UnsimulatedError(f"no part of a boundingObject can be removed; {_ELSEWHERE}")
-    if _on_robot(node) and any(_acts(it) for it in (node, *node.descendants())):
+    if _is_carried(node) and any(_acts(it) for it in (node, *node.descendants())):
         raise UnsimulatedError(
-            f"a {node.type_name} that affects the simulation cannot be removed from a robot; {_ELSEWHERE}"
+            f"a {node.type_name} that affects the simulation cannot be removed from a robot, or from a Solid"
+            f" that moves; {_ELSEWHERE}"
         )
     _require_no_client([node], "removed")
 
@@ -136,8 +138,8 @@ def _acts(node: SceneNode) -> bool:
 
 
 def resizes(node: SceneNode, field: str) -> bool:
-    """Return whether a write changes the size of an obstacle that is not part of a robot."""
-    return field in _SIZES.get(node.type_name, ()) and not any(_on_robot(twin) for twin in node.twins)
+    """Return whether a write changes the size of an obstacle that stands."""
+    return field in _SIZES.get(node.type_name, ()) and not any(_is_carried(twin) for twin in node.twins)
 
 
 def _is_drawn_only(node: SceneNode, field: str) -> bool:
@@ -149,13 +151,25 @@ def _reaches_robot(node: SceneNode, field: str) -> bool:
 
 
 def _moves(node: SceneNode, field: str) -> bool:
-    """Return whether writing the field moves the node; a robot's part with a device cannot be moved."""
+    """Return whether writing the field moves the node.
+
+    A device, a shape or a mass on a robot or on a Solid that moves cannot be moved, because the physics reads
+    its pose once.
+    """
     if field not in _PLACING or node.place is None or not node.place.placeable:
         return False
-    if node.type_name == "Robot" or not _on_robot(node):
+    if node.type_name == "Robot" or not _is_carried(node):
         return True
-    return not any(it.type_name in _MOUNTED for it in (node, *node.descendants()))
+    return not any(
+        it.type_name in _MOUNTED or it.nodes("boundingObject") or it.nodes("physics")
+        for it in (node, *node.descendants())
+    )
 
 
-def _on_robot(node: SceneNode) -> bool:
-    return any(around.type_name == "Robot" for around in node.ancestors())
+def _is_carried(node: SceneNode) -> bool:
+    """Return whether a node is inside a robot, or inside a Solid that moves by itself."""
+    return any(around.type_name == "Robot" or _moves_by_itself(around) for around in node.ancestors())
+
+
+def _moves_by_itself(node: SceneNode) -> bool:
+    return node.place is not None and node.place.moves
