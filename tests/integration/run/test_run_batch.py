@@ -11,6 +11,7 @@ import pytest
 
 from palaestra_trainer.environments.infos import OURS
 from palaestra_trainer.episodes.batch_vec_env import BatchVecEnv
+from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, WrongData
 from palaestra_trainer.job.configuration import parse
@@ -202,6 +203,17 @@ def test_a_simulator_that_dies_during_a_resume_begins_the_next_episode_of_each_r
 
         eventually(lambda: again.step(action)[3][0][OURS]["valid"])
         assert [state.episode for state in again.snapshot()] == [state.episode + 1 for state in states]
+
+
+def test_a_resume_without_open_episodes_keeps_the_progress_of_the_training() -> None:
+    """A curriculum must not begin again because the simulator restarted at the time of the checkpoint."""
+    with batch_env() as (env, _):
+        env.set_training_progress(0.8)
+
+        env.resume([EpisodeState(3, None)] * ROWS)
+
+        assert [state.training_progress for state in env.snapshot()] == [0.8] * ROWS
+        assert [state.episode for state in env.snapshot()] == [3] * ROWS
 
 
 def test_the_calls_of_a_vec_env_reach_the_one_environment_of_all_rows() -> None:

@@ -111,6 +111,17 @@ def test_a_fault_ends_the_return_that_rewards_are_scaled_by(make_env):
     assert walked == [[pytest.approx(-0.1)], [pytest.approx(-0.19)], [0.0]]
 
 
+def test_a_step_that_has_not_ended_does_not_discount_the_return(make_env):
+    """With `Asynchronous`, a slow simulator waits for many steps of the others."""
+    env = ValidNormalize(make_env(), Normalize(), GAMMA)
+    env.reset()
+    env.returns = np.array([2.0, 3.0])
+
+    env._earn(np.array([1.0, 0.0]), np.array([True, False]))
+
+    assert env.returns.tolist() == [pytest.approx(2.8), 3.0]
+
+
 def test_a_member_that_cannot_be_reset_shows_nothing_to_the_statistics(make_env):
     """Before its first reset, a simulator's observation is all zeros, which would change the mean."""
     env = ValidNormalize(make_env({}, {"resets": [1]}), Normalize(), GAMMA)

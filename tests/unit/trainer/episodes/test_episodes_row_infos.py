@@ -1,9 +1,13 @@
 """The infos of rows that are made from the info of a batched step."""
 
 import numpy as np
+import pytest
 
 from palaestra_trainer.environments.infos import OURS, TRUNCATED
 from palaestra_trainer.episodes.row_infos import row_infos
+from palaestra_trainer.errors import ConfigurationError
+
+WHOLE = np.array([False, False])
 
 
 def test_each_row_has_its_own_values_also_of_nested_parts():
@@ -27,3 +31,22 @@ def test_a_part_without_values_is_an_empty_part_of_each_row():
 
     first["reward_terms"]["own"] = 1.0
     assert second["reward_terms"] == {}
+
+
+def test_the_keys_of_stable_baselines3_are_hidden():
+    """Stable-Baselines3 reads a dict in `episode`; the rule is the same as for a single environment."""
+    first, second = row_infos({"episode": np.array([3, 4]), "lap": np.array([1, 2])}, 2, WHOLE)
+
+    assert first == {"lap": 1, TRUNCATED: False, OURS: {"valid": True, "hidden": {"episode": 3}}}
+    assert second["lap"] == 2
+
+
+@pytest.mark.parametrize(
+    ("value", "fact"),
+    [(3, "a int in 'lap'"), ([1, 2], "a list in 'lap'"), (np.zeros(3), r"the shape \(3,\) in 'lap'")],
+)
+def test_a_value_that_is_not_one_for_each_row_is_refused(value, fact):
+    """The message names the key and the number of rows, which the author of the environment needs."""
+    for info in ({"lap": value}, {"terms": {"lap": value}}):
+        with pytest.raises(ConfigurationError, match=rf"{fact}; .* each of the 2 rows"):
+            row_infos(info, 2, WHOLE)

@@ -180,7 +180,8 @@ class ValidNormalize(VecNormalize):
                 running.update(seen[name])
 
     def _earn(self, rewards: np.ndarray, valid: np.ndarray) -> None:
-        self.returns = self.returns * self.gamma + rewards
+        # A row without a transition, such as one whose step has not ended yet, keeps its discounted return.
+        self.returns = np.where(valid, self.returns * self.gamma + rewards, self.returns)
         if self.norm_reward and valid.any():
             self.ret_rms.update(self.returns[valid])
 

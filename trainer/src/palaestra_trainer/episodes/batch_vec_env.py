@@ -280,8 +280,8 @@ class BatchVecEnv(CollectingVecEnv):
     def _replay(self, states: Sequence[EpisodeState]) -> None:
         taken = [np.empty(0) if state.actions is None else state.actions for state in states]
         lengths = np.array([len(actions) for actions in taken])
-        progress = np.array([state.training_progress for state in states])
         now = self._training_progress
+        progress = np.array([now if state.actions is None else state.training_progress for state in states])
         for step in range(int(lengths.max(initial=0)), -1, -1):
             self._check()
             for share in np.unique(progress[lengths == step]):
