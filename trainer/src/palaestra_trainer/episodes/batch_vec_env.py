@@ -219,7 +219,7 @@ class BatchVecEnv(CollectingVecEnv):
             raise Diverged(
                 f"{fault}; {self._failures} rows failed, and no episode ended; fix the environment"
             )
-        self._restarter.watcher.fault(self._restarter.name, fault, length)
+        self._restarter.watcher.fault(self._restarter.name, fault, length, restarts=False)
         sim_fault = {
             "kind": fault.kind,
             "simulator": self._restarter.name,

@@ -127,8 +127,11 @@ class Watcher(Protocol):
         """Receive the number of environment steps that were just taken."""
         ...
 
-    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """Receive the fault of a simulator; the fault truncates an episode after `steps_lost` steps."""
+    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int, *, restarts: bool = True) -> None:
+        """Receive the fault of a simulator; the fault truncates an episode after `steps_lost` steps.
+
+        Without `restarts`, the simulator goes on: only one of its copies has failed.
+        """
         ...
 
     def started(self, simulator: str) -> None:
@@ -162,7 +165,7 @@ class NullWatcher:
     def stepped(self, steps: int) -> None:
         """Ignore the event."""
 
-    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
+    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int, *, restarts: bool = True) -> None:
         """Ignore the event."""
 
     def started(self, simulator: str) -> None:

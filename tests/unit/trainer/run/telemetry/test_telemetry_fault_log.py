@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.job.run_directory import read_lines
 from palaestra_trainer.run.telemetry import fault_log
 from palaestra_trainer.run.telemetry.fault_log import FaultLog
@@ -48,6 +48,23 @@ def test_a_fault_is_written_at_once_and_its_end_when_the_simulator_is_up(progres
         "attempt": 2,
         "up_after_s": [4.0, 1.5],
     }
+
+
+def test_a_copy_that_fails_does_not_mark_its_simulator_as_down(progress, tmp_path, clock):
+    """A simulator with copies goes on, so it is not down for the rest of the run."""
+    progress.started("collect-0")
+    progress.started("collect-1")
+    fault = WrongData("collect-0", "row 3: its simulation diverged")
+    progress.fault("collect-0", fault, 7, restarts=False)
+    down = progress.down()
+    clock.now = 60.0
+    progress.restarted("collect-0", recycled=True)
+
+    lines = [*read_lines(tmp_path / "faults.jsonl")]
+
+    assert [line.get("fact") or line["up_after_s"] for line in lines] == [str(fault), [0.0]]
+    assert progress.counters.faults[fault.kind] == 1
+    assert down == []
 
 
 def test_a_recycled_simulator_had_no_fault(progress, tmp_path):

@@ -171,8 +171,11 @@ class Progress:
         """Restore the returns of the last episodes before this attempt."""
         self._returns.extend(returns)
 
-    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """Count a fault and the steps of the episode that it truncated; mark the simulator as down."""
+    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int, *, restarts: bool = True) -> None:
+        """Count a fault and the steps of the episode that it truncated.
+
+        Mark the simulator as down if it restarts.
+        """
         record = FaultRecord(
             time=timestamp(time.time()),
             simulator=simulator,
@@ -185,8 +188,12 @@ class Progress:
             self.counters.faults[fault.kind] += 1
             self._goodput.in_vain()
             self._standings.broke(record)
+            if not restarts:
+                self._standings.is_up(simulator)
         if self.fault_log is not None:
             self.fault_log.broke(record, steps_lost)
+            if not restarts:
+                self.fault_log.is_up(simulator)
 
     def slow(self, simulator: str, seconds: float) -> None:
         """Count a step that took much longer than usual, which is not a fault."""
