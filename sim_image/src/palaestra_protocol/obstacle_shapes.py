@@ -8,8 +8,9 @@ inside.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final, NamedTuple, TypeAlias
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import Final, Generic, NamedTuple, TypeAlias, TypeVar
 
 Vector: TypeAlias = tuple[float, float, float]
 Turn: TypeAlias = tuple[float, float, float, float]
@@ -71,6 +72,62 @@ class PartFrame(NamedTuple):
     def _round(self, radius_m: float, half_m: float) -> ObstacleShape:
         widest = max(math.hypot(*row) for row in self.rows[:2])
         return ObstacleShape(self.center, (0.0, 0.0, half_m), radius_m * widest)
+
+
+NodeT = TypeVar("NodeT")
+
+
+class ShapeReader(ABC, Generic[NodeT]):
+    """Reads the shapes of a boundingObject; a subclass reads the nodes, over ROS or in a simulation."""
+
+    def parts(self, node: NodeT, field: str, frame: PartFrame) -> Iterator[ObstacleShape]:
+        """Yield the boxes, cylinders, capsules and spheres in a field of a node, whose frame is `frame`."""
+        for child in self.nodes(node, field):
+            match self.kind(child):
+                case "Shape":
+                    yield from self.parts(child, "geometry", frame)
+                case "Group":
+                    yield from self.parts(child, "children", frame)
+                case "Pose" | "Transform":
+                    place = self.vector(child, "translation"), self.rotation(child), self.scale(child)
+                    yield from self.parts(child, "children", frame.inside(*place))
+                case "Box":
+                    yield frame.box(self.vector(child, "size"))
+                case "Cylinder":
+                    yield frame.cylinder(self.number(child, "radius"), self.number(child, "height"))
+                case "Capsule":
+                    yield frame.capsule(self.number(child, "radius"), self.number(child, "height"))
+                case "Sphere":
+                    yield frame.sphere(self.number(child, "radius"))
+
+    @abstractmethod
+    def nodes(self, node: NodeT, field: str) -> Sequence[NodeT]:
+        """Return the nodes in a field; an empty sequence if the node has no such field."""
+
+    @abstractmethod
+    def kind(self, node: NodeT) -> str:
+        """Return the name of the node's PROTO, or else of its type."""
+
+    @abstractmethod
+    def number(self, node: NodeT, field: str) -> float:
+        """Return the number in a field."""
+
+    @abstractmethod
+    def vector(self, node: NodeT, field: str) -> Vector:
+        """Return the three numbers in a field."""
+
+    @abstractmethod
+    def rotation(self, node: NodeT) -> Turn:
+        """Return the field `rotation` as a quaternion."""
+
+    @abstractmethod
+    def scale(self, node: NodeT) -> Vector:
+        """Return the field `scale`; ones if the node has no such field."""
+
+
+def is_round(shapes: Sequence[ObstacleShape]) -> bool:
+    """Return whether a rotation about z does not change the outline of an object with these shapes."""
+    return all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in shapes)
 
 
 def heading_of(turn: Turn) -> float:

@@ -15,9 +15,11 @@ from typing import Any, NamedTuple
 from palaestra_protocol.obstacle_shapes import (
     ObstacleShape,
     PartFrame,
+    ShapeReader,
     Turn,
     Vector,
     heading_of,
+    is_round,
     tilt_of,
 )
 from palaestra_trainer.errors import WorldMisfit
@@ -57,7 +59,7 @@ class _Known(NamedTuple):
     shapes: tuple[ObstacleShape, ...]
 
 
-class ObstacleReader:
+class ObstacleReader(ShapeReader[int]):
     """Reads the objects of a world.
 
     Args:
@@ -92,13 +94,15 @@ class ObstacleReader:
         ]
 
     def _find(self) -> Iterator[_Known]:
-        for node in self._nodes(self._ask("supervisor/get_root", "get_uint64", ask=True).value, "children"):
-            kind = self._kind(node)
+        for node in self.nodes(self._ask("supervisor/get_root", "get_uint64", ask=True).value, "children"):
+            kind = self.kind(node)
             if kind in _FLOOR_FIELDS:
-                x, y, _ = self._vector(node, _FLOOR_FIELDS[kind], "vec2f")
+                x, y, _ = self._value(self._field(node, _FLOOR_FIELDS[kind]), "vec2f")
                 yield self._known(FLOOR, node, (PartFrame().box((x, y, 0.0)),))
             elif self._ask("supervisor/node/get_base_type_name", "node_get_name", node=node).name == "Solid":
-                shapes = tuple(self._shapes(node, "boundingObject", self._tilt(node)))
+                shapes = tuple(
+                    self.parts(node, "boundingObject", tilt_of(self._turn(node), self.scale(node)))
+                )
                 if shapes:
                     name = self._ask("supervisor/node/get_def", "node_get_name", node=node).name
                     yield self._known(name, node, shapes)
@@ -107,41 +111,18 @@ class ObstacleReader:
         heading_rad = None
         if name == FLOOR:
             heading_rad = heading_of(self._turn(node))
-        elif all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in shapes):
+        elif is_round(shapes):
             heading_rad = 0.0
         return _Known(name, node, self._field(node, "translation"), heading_rad, shapes)
 
-    def _shapes(self, node: int, field: str, frame: PartFrame) -> Iterator[ObstacleShape]:
-        for child in self._nodes(node, field):
-            match self._kind(child):
-                case "Shape":
-                    yield from self._shapes(child, "geometry", frame)
-                case "Group":
-                    yield from self._shapes(child, "children", frame)
-                case "Pose" | "Transform":
-                    yield from self._shapes(child, "children", self._inside(child, frame))
-                case "Box":
-                    yield frame.box(self._vector(child, "size", "vec3f"))
-                case "Cylinder":
-                    yield frame.cylinder(self._number(child, "radius"), self._number(child, "height"))
-                case "Capsule":
-                    yield frame.capsule(self._number(child, "radius"), self._number(child, "height"))
-                case "Sphere":
-                    yield frame.sphere(self._number(child, "radius"))
-
-    def _inside(self, node: int, frame: PartFrame) -> PartFrame:
-        """Return the frame of a Pose or Transform in `frame`."""
+    def rotation(self, node: int) -> Turn:
+        """Return the field `rotation` as a quaternion."""
         found = self._ask(
             "supervisor/field/get_rotation", "field_get_rotation", field=self._field(node, "rotation")
         ).value
-        turn = (found.x, found.y, found.z, found.w)
-        return frame.inside(self._vector(node, "translation", "vec3f"), turn, self._scale(node))
+        return (found.x, found.y, found.z, found.w)
 
-    def _tilt(self, node: int) -> PartFrame:
-        """Return the frame of an object's parts, whose rotation about z is taken away."""
-        return tilt_of(self._turn(node), self._scale(node))
-
-    def _scale(self, node: int) -> Vector:
+    def scale(self, node: int) -> Vector:
         """Return the scale of a node; only a Transform and old forms of a Solid have this field."""
         field = self._field(node, "scale")
         return self._value(field, "vec3f") if field else (1.0, 1.0, 1.0)
@@ -159,33 +140,36 @@ class ObstacleReader:
     def _heading(self, known: _Known) -> float:
         return heading_of(self._turn(known.node)) if known.heading_rad is None else known.heading_rad
 
-    def _nodes(self, node: int, name: str) -> list[int]:
+    def nodes(self, node: int, field: str) -> list[int]:
         """Return the nodes in a field; [] if the node has no such field."""
-        field = self._field(node, name)
-        if not field:
+        handle = self._field(node, field)
+        if not handle:
             return []
-        several = name == "children"
+        several = field == "children"
         count = (
-            self._ask("supervisor/field/get_count", "field_get_count", field=field).count if several else 1
+            self._ask("supervisor/field/get_count", "field_get_count", field=handle).count if several else 1
         )
         got = (
-            self._ask("supervisor/field/get_node", "field_get_node", field=field, index=index).node
+            self._ask("supervisor/field/get_node", "field_get_node", field=handle, index=index).node
             for index in range(count)
         )
         return [found for found in got if found]
 
-    def _kind(self, node: int) -> str:
+    def kind(self, node: int) -> str:
+        """Return the name of the node's PROTO, or else of its type."""
         return str(self._ask("supervisor/node/get_type_name", "node_get_name", node=node).name)
 
     def _field(self, node: int, name: str) -> int:
         return int(self._ask("supervisor/node/get_field", "node_get_field", node=node, fieldName=name).field)
 
-    def _number(self, node: int, name: str) -> float:
-        field = self._field(node, name)
-        return float(self._ask("supervisor/field/get_float", "field_get_float", field=field).value)
+    def number(self, node: int, field: str) -> float:
+        """Return the number in a field."""
+        handle = self._field(node, field)
+        return float(self._ask("supervisor/field/get_float", "field_get_float", field=handle).value)
 
-    def _vector(self, node: int, name: str, kind: str) -> Vector:
-        return self._value(self._field(node, name), kind)
+    def vector(self, node: int, field: str) -> Vector:
+        """Return the three numbers in a field."""
+        return self._value(self._field(node, field), "vec3f")
 
     def _value(self, field: int, kind: str) -> Vector:
         value = self._ask(f"supervisor/field/get_{kind}", f"field_get_{kind}", field=field).value

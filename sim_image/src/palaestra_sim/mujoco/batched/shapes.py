@@ -9,9 +9,11 @@ from palaestra_protocol.batch import BatchShape
 from palaestra_protocol.obstacle_shapes import (
     ObstacleShape,
     PartFrame,
+    ShapeReader,
     Turn,
     Vector,
     heading_of,
+    is_round,
     tilt_of,
 )
 from palaestra_sim.scene.geometry import axis_angle_to_quaternion, to_quaternion
@@ -28,25 +30,25 @@ def shapes_of(simulation: Simulation) -> tuple[BatchShape, ...]:
     return tuple(_Reader(simulation).read())
 
 
-class _Reader:
+class _Reader(ShapeReader[SceneNode]):
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
 
     def read(self) -> Iterator[BatchShape]:
         for node in self._simulation.tree.root.nodes():
-            kind = node.proto_name or node.type_name
+            kind = self.kind(node)
             if kind in _FLOOR_FIELDS:
                 x, y = self._value(node, _FLOOR_FIELDS[kind], FieldType.VEC2F)
                 yield from self._shapes(FLOOR, node, [PartFrame().box((x, y, 0.0))])
             elif node.type_name == "Solid":
-                tilt = tilt_of(_turn(node), self._scale(node))
-                parts = list(self._parts(node.nodes("boundingObject"), tilt))
+                tilt = tilt_of(_turn(node), self.scale(node))
+                parts = list(self.parts(node, "boundingObject", tilt))
                 yield from self._shapes(node.def_name, node, parts)
 
     def _shapes(self, name: str, node: SceneNode, parts: list[ObstacleShape]) -> Iterator[BatchShape]:
-        x, y, z = self._value(node, "translation", FieldType.VEC3F)
+        x, y, z = self.vector(node, "translation")
         heading_rad = 0.0
-        if name == FLOOR or not all(part.radius_m and part.center[:2] == (0.0, 0.0) for part in parts):
+        if name == FLOOR or not is_round(parts):
             heading_rad = heading_of(_turn(node))
         for part in parts:
             center, half = part.center, part.half
@@ -65,35 +67,31 @@ class _Reader:
                 radius=part.radius_m,
             )
 
-    def _parts(self, nodes: tuple[SceneNode, ...], frame: PartFrame) -> Iterator[ObstacleShape]:
-        for node in nodes:
-            match node.proto_name or node.type_name:
-                case "Shape":
-                    yield from self._parts(node.nodes("geometry"), frame)
-                case "Group":
-                    yield from self._parts(node.nodes(), frame)
-                case "Pose" | "Transform":
-                    yield from self._parts(node.nodes(), self._inside(node, frame))
-                case "Box":
-                    yield frame.box(self._value(node, "size", FieldType.VEC3F))
-                case "Cylinder":
-                    yield frame.cylinder(self._number(node, "radius"), self._number(node, "height"))
-                case "Capsule":
-                    yield frame.capsule(self._number(node, "radius"), self._number(node, "height"))
-                case "Sphere":
-                    yield frame.sphere(self._number(node, "radius"))
+    def nodes(self, node: SceneNode, field: str) -> tuple[SceneNode, ...]:
+        """Return the nodes in a field."""
+        return node.nodes(field)
 
-    def _inside(self, node: SceneNode, frame: PartFrame) -> PartFrame:
-        """Return the frame of a Pose or Transform in `frame`."""
-        turn = axis_angle_to_quaternion(self._value(node, "rotation", FieldType.ROTATION))
-        return frame.inside(self._value(node, "translation", FieldType.VEC3F), turn, self._scale(node))
+    def kind(self, node: SceneNode) -> str:
+        """Return the name of the node's PROTO, or else of its type."""
+        return node.proto_name or node.type_name
 
-    def _scale(self, node: SceneNode) -> Vector:
+    def vector(self, node: SceneNode, field: str) -> Vector:
+        """Return the three numbers in a field."""
+        found: Vector = self._value(node, field, FieldType.VEC3F)
+        return found
+
+    def rotation(self, node: SceneNode) -> Turn:
+        """Return the field `rotation` as a quaternion."""
+        return axis_angle_to_quaternion(self._value(node, "rotation", FieldType.ROTATION))
+
+    def scale(self, node: SceneNode) -> Vector:
+        """Return the field `scale`; ones if the node has no such field."""
         field = self._simulation.tree.field_of(node, "scale", self._simulation)
         return (1.0, 1.0, 1.0) if field is None else field.get(FieldType.VEC3F)
 
-    def _number(self, node: SceneNode, name: str) -> float:
-        return float(self._value(node, name, FieldType.FLOAT))
+    def number(self, node: SceneNode, field: str) -> float:
+        """Return the number in a field."""
+        return float(self._value(node, field, FieldType.FLOAT))
 
     def _value(self, node: SceneNode, name: str, type_: FieldType) -> Any:
         field = self._simulation.tree.field_of(node, name, self._simulation)
