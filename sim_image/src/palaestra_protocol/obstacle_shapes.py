@@ -2,7 +2,8 @@
 
 A box along the axes of its object, and a round shape that stands upright, have their exact size. A shape that
 is turned or scaled in another way becomes the smallest box around it, so that it never has a free place
-inside.
+inside. So does a set of faces. The size of a Mesh is in a file, so readers leave such shapes out and report
+them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ Turn: TypeAlias = tuple[float, float, float, float]
 """A unit quaternion x, y, z, w."""
 Rows: TypeAlias = tuple[Vector, Vector, Vector]
 
+MOST_POINTS: Final = 2000  # a reader requests each point of a set of faces: a second for so many
 _NOTHING: Final = 1e-9  # a smaller part of a unit vector or quaternion is a rounding error
+_FACES: Final = frozenset(("IndexedFaceSet", "Extrusion"))  # the simulators convert an Extrusion to faces
 _ORIGIN: Final[Vector] = (0.0, 0.0, 0.0)
 _AXES: Final[Rows] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -64,6 +67,15 @@ class PartFrame(NamedTuple):
         """Return a Sphere."""
         return self._round(radius_m, radius_m * math.hypot(*self.rows[2]))
 
+    def around(self, points: Sequence[Vector]) -> ObstacleShape:
+        """Return the smallest box around points; there must be a point."""
+        sides = [
+            [at + _dot(row, point) for point in points]
+            for at, row in zip(self.center, self.rows, strict=True)
+        ]
+        x, y, z = ((0.5 * (min(side) + max(side)), 0.5 * (max(side) - min(side))) for side in sides)
+        return ObstacleShape((x[0], y[0], z[0]), (x[1], y[1], z[1]), 0.0)
+
     @property
     def _is_upright(self) -> bool:
         tilts = (self.rows[0][2], self.rows[1][2], *self.rows[2][:2])
@@ -81,7 +93,7 @@ class ShapeReader(ABC, Generic[NodeT]):
     """Reads the shapes of a boundingObject; a subclass reads the nodes, over ROS or in a simulation."""
 
     def parts(self, node: NodeT, field: str, frame: PartFrame) -> Iterator[ObstacleShape]:
-        """Yield the boxes, cylinders, capsules and spheres in a field of a node, whose frame is `frame`."""
+        """Yield the shapes in a field of a node, whose frame is `frame`; see `leave_out` for other shapes."""
         for child in self.nodes(node, field):
             match self.kind(child):
                 case "Shape":
@@ -91,14 +103,37 @@ class ShapeReader(ABC, Generic[NodeT]):
                 case "Pose" | "Transform":
                     place = self.vector(child, "translation"), self.rotation(child), self.scale(child)
                     yield from self.parts(child, "children", frame.inside(*place))
-                case "Box":
-                    yield frame.box(self.vector(child, "size"))
-                case "Cylinder":
-                    yield frame.cylinder(self.number(child, "radius"), self.number(child, "height"))
-                case "Capsule":
-                    yield frame.capsule(self.number(child, "radius"), self.number(child, "height"))
-                case "Sphere":
-                    yield frame.sphere(self.number(child, "radius"))
+                case "Plane":
+                    pass  # a floor, or a ceiling, which no robot touches
+                case kind:
+                    shape = self._shape(child, kind, frame)
+                    if shape is None:
+                        self.leave_out(kind)
+                    else:
+                        yield shape
+
+    def _shape(self, node: NodeT, kind: str, frame: PartFrame) -> ObstacleShape | None:
+        """Return the shape of a geometry node; None if the fields of the node do not have its size."""
+        match kind:
+            case "Box":
+                return frame.box(self.vector(node, "size"))
+            case "Cylinder":
+                return frame.cylinder(self.number(node, "radius"), self.number(node, "height"))
+            case "Capsule":
+                return frame.capsule(self.number(node, "radius"), self.number(node, "height"))
+            case "Sphere":
+                return frame.sphere(self.number(node, "radius"))
+        faces = self.nodes(node, "coord") if kind in _FACES else ()
+        points = [point for coordinate in faces for point in self.points(coordinate)]
+        return frame.around(points) if points else None
+
+    @abstractmethod
+    def leave_out(self, kind: str) -> None:
+        """Record that a shape is left out, because no field has its size; `kind` is the name of its type."""
+
+    @abstractmethod
+    def points(self, coordinate: NodeT) -> Sequence[Vector]:
+        """Return the points of a Coordinate; an empty sequence if it has more than `MOST_POINTS`."""
 
     @abstractmethod
     def nodes(self, node: NodeT, field: str) -> Sequence[NodeT]:

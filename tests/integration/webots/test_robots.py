@@ -1,7 +1,12 @@
 """Robots and scenes in simulators: the nodes that a class names exist, and the layout is the world's."""
 
-import pytest
+from collections import Counter
+from itertools import product
 
+import pytest
+from structlog.testing import capture_logs
+
+from palaestra_protocol.obstacle_shapes import MOST_POINTS
 from palaestra_sim.mujoco.batched.shapes import shapes_of
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.simulation import Simulation
@@ -53,7 +58,16 @@ DEF TURNED Solid { translation 5 5 0.5 rotation 0 0 1 0.5 name "turned" bounding
   Transform { translation 0.5 0 0 scale 2 3 1 children Box { } }
   Pose { translation 0 1 0 rotation 1 0 0 1.5707963 children Cylinder { radius 0.1 height 0.4 } }
   Sphere { radius 0.1 } ] } }
+DEF WEDGE Solid { translation -5 5 0.5 rotation 0 0 1 0.5 name "wedge" boundingObject Pose {
+  translation 0.1 0.2 0 rotation 0 0 1 0.7 children IndexedFaceSet {
+    coord Coordinate { point [ 0 0 0, 1 0 0, 0 2 0, 0 0 0.5 ] }
+    coordIndex [ 0 2 1 -1 0 1 3 -1 1 2 3 -1 2 0 3 -1 ] } } }
 """
+GRID = product(range(MOST_POINTS // 40 + 1), range(40))
+POINTS = ", ".join(f"{x / 100} {y / 100} {x * y % 7 / 100}" for x, y in GRID)  # more than a reader requests
+FINE = f"""DEF FINE Solid {{ translation -5 -5 0.5 boundingObject IndexedFaceSet {{
+  coord Coordinate {{ point [ {POINTS} ] }} coordIndex [ 0 1 40 -1 1 41 40 -1 ] }} }}
+""".encode()
 
 
 class Noting(Services):
@@ -196,23 +210,29 @@ def test_the_layout_is_that_of_the_world(arena, running):
             )
 
 
-def test_turned_and_scaled_obstacles_are_those_of_the_copies(running):
+def test_turned_and_scaled_obstacles_are_those_of_the_copies(running, caplog):
     """A policy is trained in the copies and evaluated over ROS, so both must draw the same free places."""
     world = builtin("arena").replace(b"DEF FLOOR Solid {", b"DEF FLOOR Solid { rotation 0 0 1 1.5707963")
-    robot, _ = running(Robotino, world + TURNED, "robotino")
+    world += TURNED + FINE
+    robot, _ = running(Robotino, world, "robotino")
     services = Noting(robot.node_name)
     try:
-        found = [
-            (thing.name, *thing.place, thing.heading_rad, *shape.center, *shape.half, shape.radius_m)
-            for thing in ObstacleReader(services).read()
-            for shape in thing.shapes
-        ]
+        with capture_logs() as logs:
+            found = [
+                (thing.name, *thing.place, thing.heading_rad, *shape.center, *shape.half, shape.radius_m)
+                for thing in ObstacleReader(services).read()
+                for shape in thing.shapes
+            ]
     finally:
         services.close()
-    simulation = Simulation.load(world + TURNED, StubPhysics(), "world.wbt", Mode.FAST)
+    simulation = Simulation.load(world, StubPhysics(), "world.wbt", Mode.FAST)
 
     assert found == [tuple(shape.to_json().values()) for shape in shapes_of(simulation)]
-    assert len([it for it in found if it[0] == "TURNED"]) == 4
+    counts = Counter(name for name, *_ in found)
+    assert (counts["TURNED"], counts["WEDGE"], counts["FINE"]) == (4, 1, 0)
+    warned = [(line["event"], line["shapes"]) for line in logs]
+    assert warned == [("obstacles without a known size are not in the layout", {"IndexedFaceSet": 1})]
+    assert "not in the layout: 1 IndexedFaceSet" in caplog.text
 
 
 def test_the_layout_follows_a_thing_that_somebody_moved(arena):

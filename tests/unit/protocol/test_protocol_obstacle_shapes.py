@@ -68,6 +68,17 @@ def test_a_round_shape_covers_its_surface(turn, radius_m, height_m):
     assert frame.sphere(radius_m).radius_m == pytest.approx(radius_m)
 
 
+@given(VECTORS, turns(), SIZES, st.lists(VECTORS, min_size=1, max_size=9))
+def test_a_set_of_faces_has_the_smallest_box_around_its_points(at, turn, scale, points):
+    """A task must not put a robot inside an object of faces, and a larger box would take free places."""
+    middle, half = extent(turned(turn, np.array(points) * scale) + at)
+
+    found = PartFrame().inside(at, turn, scale).around(points)
+
+    assert found.center == pytest.approx(middle, abs=1e-9)
+    assert found.half == pytest.approx(half, abs=1e-9)
+
+
 @given(SIZES, LENGTHS, LENGTHS)
 def test_an_upright_round_shape_keeps_its_radius(scale, radius_m, height_m):
     """A scale that makes it an ellipse gives it the larger radius, so that it covers the ellipse."""

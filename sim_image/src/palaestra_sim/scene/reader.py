@@ -22,7 +22,8 @@ from palaestra_sim.scene.mass import DENSITY, volume_m3
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.physics_settings import Floor, PhysicsSettings, read_surroundings
-from palaestra_sim.scene.robot_reader import RobotParts, read_robot
+from palaestra_sim.scene.robot_parts import RobotParts
+from palaestra_sim.scene.robot_reader import read_robot
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.validation import ELSEWHERE, LeaveOut, NodeReader

@@ -26,7 +26,7 @@ from palaestra_sim.scene.motion import Motion, Trail, motion_of
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.scene.physics import Cast, Physics
-from palaestra_sim.scene.robot_reader import RobotParts
+from palaestra_sim.scene.robot_parts import RobotParts
 from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.visual_rays import Glance, VisualRays
 from palaestra_sim.scene.visuals import View

@@ -8,10 +8,10 @@ physics moves joints by forces (`robot_links`). A robot without an outline and w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
-from palaestra_sim.scene.arguments import ControllerArguments, read_arguments
+from palaestra_sim.scene.arguments import read_arguments
 from palaestra_sim.scene.bodies import Body, Build
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.device_type import DevicePart, Devices, DeviceType, Shaft
@@ -37,6 +37,7 @@ from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.robot_frame import RobotFrame, TurnedFrame
 from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
+from palaestra_sim.scene.robot_parts import RobotParts
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.steering import SteeredDrive, Tire, find_steered_drive
 from palaestra_sim.scene.validation import NodeReader
@@ -57,28 +58,6 @@ _NAME_IT: Final = "give it a unique name of letters, digits and underscores, or 
 # Robots drive over steps that are lower than this. Real worlds need this tolerance, because their robots
 # start slightly inside the floor.
 _STEP_M: Final = 0.005
-
-
-@dataclass(slots=True, kw_only=True, eq=False)
-class RobotParts:
-    """A robot of the world file.
-
-    Attributes:
-        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
-            obstacle.
-        standing: the outline of a robot that cannot move and does not stand upright on the floor.
-        arguments: the robot's controllerArgs; None if the robot's controller is not "ros".
-        links: the parts on the robot's joints that forces move.
-    """
-
-    node: SceneNode
-    name: str
-    place: Frame
-    devices: Devices
-    body: Body | None
-    standing: tuple[Shape, ...] = ()
-    arguments: ControllerArguments | None = None
-    links: tuple[Link, ...] = ()
 
 
 def read_robot(reading: NodeReader, node: SceneNode, parent: Frame | None, physics: Physics) -> RobotParts:
@@ -147,6 +126,7 @@ class _RobotReader:
             standing=() if moves else tuple(self._on(own, shape) for shape in shapes),
             arguments=read_arguments(reading, node) if self._by_ros else None,
             links=links,
+            passing=self._passing(shapes, links),
         )
 
     def _find_drive(self) -> tuple[list[Driven], Drive | SteeredDrive | None]:
@@ -173,6 +153,14 @@ class _RobotReader:
             wheels=wheels,
             steering=self._steering,
             measured=self._measured,
+        )
+
+    def _passing(self, shapes: Sequence[Shape], links: Sequence[Link]) -> tuple[SceneNode, ...]:
+        touching = {shape.place for shape in shapes} | {shape.place for it in links for shape in it.shapes}
+        return tuple(
+            node
+            for node, place in self._parts
+            if _moves(place) and node.nodes("boundingObject") and place not in touching
         )
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
@@ -254,13 +242,21 @@ class _RobotReader:
     def _read_frame(self, node: SceneNode, place: Frame) -> None:
         self._parts.append((node, place))
         if node.type_name in _MOUNTED:
-            self._read_device(_MOUNTED[node.type_name], node, place)
-        elif node.type_name == "Solid" and (self._forces or not _moves(place)):
-            kept = self._carried if _moves(place) else self._outline
-            kept += bounding_shapes(self._reading, node, place)
+            self._read_device(_MOUNTED[node.type_name], node, place, shapes=self._take_shapes(node, place))
+        elif node.type_name == "Solid":
+            self._take_shapes(node, place)
         elif node.type_name == "Track":
             self._read_track(node, place)
         self._read_children(node, place)
+
+    def _take_shapes(self, node: SceneNode, place: Frame) -> list[Shape]:
+        """Return the shapes of a part that may collide, after adding them to the shapes of the robot."""
+        if _moves(place) and not self._forces:
+            return []
+        shapes = list(bounding_shapes(self._reading, node, place))
+        kept = self._carried if _moves(place) else self._outline
+        kept += shapes
+        return shapes
 
     def _read_track(self, node: SceneNode, place: Frame) -> None:
         """Read a track as a fixed part, with a belt that may drive the robot."""
@@ -340,7 +336,12 @@ class _RobotReader:
         return shaft.motor
 
     def _read_device(
-        self, kind: DeviceType[Any], node: SceneNode, place: Frame, shaft: Shaft | None = None
+        self,
+        kind: DeviceType[Any],
+        node: SceneNode,
+        place: Frame,
+        shaft: Shaft | None = None,
+        shapes: Sequence[Shape] = (),
     ) -> object:
         """Return the device at `node`, after adding it to the robot."""
         name = node.text("name") or kind.name
@@ -351,7 +352,7 @@ class _RobotReader:
             name=name,
             place=place,
             shaft=shaft,
-            outline=self._outline,
+            shapes=shapes,
             measured=self._measured,
             forces=self._forces,
         )

@@ -14,7 +14,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.robot import Robot
-from palaestra_sim.scene.robot_reader import RobotParts
+from palaestra_sim.scene.robot_parts import RobotParts
 from palaestra_sim.scene.steering import SteeredDrive
 from palaestra_sim.scene.tree.field_types import without_effect
 from palaestra_sim.scene.tree.scene_tree import SceneTree
@@ -128,6 +128,8 @@ def differences(simulation: Described) -> Iterator[str]:
             yield f"{count} {type_name} that no sensor sees: only a Mesh of an STL or OBJ file is seen"
     if lidars:
         yield f"{lidars} Lidar: rays pass through the robot itself"
+    for type_name, count in sorted(Counter(it.type_name for robot in robots for it in robot.passing).items()):
+        yield f"{count} {type_name} on a joint with a motor: collides with nothing"
     yield from _without_physics(it for it in robots if not _of_a_model(it.node))
     for type_name, count in sorted(meshes.items()):
         yield f"{count} {type_name} as boundingObject: robots touch its convex hull"

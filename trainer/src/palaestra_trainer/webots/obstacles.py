@@ -1,18 +1,23 @@
 """Read the objects in a world from its nodes, through the supervisor.
 
-An object is a Solid at the top of the scene tree whose boundingObject consists of boxes, cylinders, capsules
-and spheres. The shapes of an object are read once after each start. The position of an object is read at
-every `read`, so a moved object has its current position. The floor is the Solid with DEF `FLOOR` and a box,
-or a RectangleArena or Floor of Webots. The reader ignores Solids inside other nodes, and Solids that a
-program adds while the simulation runs.
+An object is a Solid at the top of the scene tree whose boundingObject consists of boxes, cylinders, capsules,
+spheres and sets of faces. A warning reports other shapes, which the reader leaves out. The shapes of an
+object are read once after each start. The position of an object is read at every `read`, so a moved object
+has its current position. The floor is the Solid with DEF `FLOOR` and a box, or a RectangleArena or Floor of
+Webots. The reader ignores Solids inside other nodes, and Solids that a program adds while the simulation
+runs.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import structlog
+
 from palaestra_protocol.obstacle_shapes import (
+    MOST_POINTS,
     ObstacleShape,
     PartFrame,
     ShapeReader,
@@ -24,6 +29,8 @@ from palaestra_protocol.obstacle_shapes import (
 )
 from palaestra_trainer.errors import WorldMisfit
 from palaestra_trainer.webots.services import Services
+
+log = structlog.get_logger(__name__)
 
 FLOOR = "FLOOR"  # the DEF name of the floor in a world
 FLOOR_REMEDY = (
@@ -69,6 +76,7 @@ class ObstacleReader(ShapeReader[int]):
     def __init__(self, services: Services) -> None:
         self._services = services
         self._things: list[_Known] | None = None
+        self._left_out = Counter[str]()
 
     def forget(self) -> None:
         """Drop the known nodes, because handles become invalid when the world is reloaded."""
@@ -82,7 +90,7 @@ class ObstacleReader(ShapeReader[int]):
             SimulatorDead, SimulatorHung, WrongData
         """
         if self._things is None:
-            self._things = list(self._find())
+            self._things = self._find_all()
         if not any(known.name == FLOOR for known in self._things):
             raise WorldMisfit(
                 self._services.node_name,
@@ -92,6 +100,18 @@ class ObstacleReader(ShapeReader[int]):
             Thing(known.name, self._place(known), self._heading(known), known.shapes)
             for known in self._things
         ]
+
+    def _find_all(self) -> list[_Known]:
+        before = self._left_out
+        self._left_out = Counter()
+        found = list(self._find())
+        if self._left_out != before:
+            log.warning("obstacles without a known size are not in the layout", shapes=dict(self._left_out))
+        return found
+
+    def leave_out(self, kind: str) -> None:
+        """Count a shape for the warning; the same shapes are reported once, not after each start."""
+        self._left_out[kind] += 1
 
     def _find(self) -> Iterator[_Known]:
         for node in self.nodes(self._ask("supervisor/get_root", "get_uint64", ask=True).value, "children"):
@@ -145,10 +165,7 @@ class ObstacleReader(ShapeReader[int]):
         handle = self._field(node, field)
         if not handle:
             return []
-        several = field == "children"
-        count = (
-            self._ask("supervisor/field/get_count", "field_get_count", field=handle).count if several else 1
-        )
+        count = self._count(handle) if field == "children" else 1
         got = (
             self._ask("supervisor/field/get_node", "field_get_node", field=handle, index=index).node
             for index in range(count)
@@ -171,8 +188,17 @@ class ObstacleReader(ShapeReader[int]):
         """Return the three numbers in a field."""
         return self._value(self._field(node, field), "vec3f")
 
-    def _value(self, field: int, kind: str) -> Vector:
-        value = self._ask(f"supervisor/field/get_{kind}", f"field_get_{kind}", field=field).value
+    def points(self, coordinate: int) -> list[Vector]:
+        """Return the points of a Coordinate; [] if it has more than `MOST_POINTS`."""
+        field = self._field(coordinate, "point")
+        count = self._count(field) if field else 0
+        return [self._value(field, "vec3f", index) for index in range(count if count <= MOST_POINTS else 0)]
+
+    def _count(self, field: int) -> int:
+        return int(self._ask("supervisor/field/get_count", "field_get_count", field=field).count)
+
+    def _value(self, field: int, kind: str, index: int = 0) -> Vector:
+        value = self._ask(f"supervisor/field/get_{kind}", f"field_get_{kind}", field=field, index=index).value
         return (value.x, value.y, value.z)
 
     def _ask(self, path: str, type_name: str, **fields: Any) -> Any:

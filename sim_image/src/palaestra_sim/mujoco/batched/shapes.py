@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
 from palaestra_protocol.batch import BatchShape
 from palaestra_protocol.obstacle_shapes import (
+    MOST_POINTS,
     ObstacleShape,
     PartFrame,
     ShapeReader,
@@ -21,18 +24,26 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.tree.field_types import FieldType
 
+log = logging.getLogger(__name__)
+
 FLOOR: Final = "FLOOR"
 _FLOOR_FIELDS: Final = {"RectangleArena": "floorSize", "Floor": "size"}
 
 
 def shapes_of(simulation: Simulation) -> tuple[BatchShape, ...]:
     """Return the shapes of the Solids at the top of a world, in the order of the world."""
-    return tuple(_Reader(simulation).read())
+    reader = _Reader(simulation)
+    found = tuple(reader.read())
+    if reader.left_out:
+        counts = ", ".join(f"{count} {kind}" for kind, count in sorted(reader.left_out.items()))
+        log.warning("obstacles without a known size are not in the layout: %s", counts)
+    return found
 
 
 class _Reader(ShapeReader[SceneNode]):
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
+        self.left_out = Counter[str]()
 
     def read(self) -> Iterator[BatchShape]:
         for node in self._simulation.tree.root.nodes():
@@ -70,6 +81,18 @@ class _Reader(ShapeReader[SceneNode]):
     def nodes(self, node: SceneNode, field: str) -> tuple[SceneNode, ...]:
         """Return the nodes in a field."""
         return node.nodes(field)
+
+    def leave_out(self, kind: str) -> None:
+        """Count a shape for the warning."""
+        self.left_out[kind] += 1
+
+    def points(self, coordinate: SceneNode) -> list[Vector]:
+        """Return the points of a Coordinate; [] if it has more than `MOST_POINTS`."""
+        field = self._simulation.tree.field_of(coordinate, "point", self._simulation)
+        count = 0 if field is None else field.count
+        if field is None or count > MOST_POINTS:
+            return []
+        return [field.get(FieldType.VEC3F, index) for index in range(count)]
 
     def kind(self, node: SceneNode) -> str:
         """Return the name of the node's PROTO, or else of its type."""

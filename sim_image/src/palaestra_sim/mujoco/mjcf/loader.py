@@ -17,7 +17,7 @@ from palaestra_sim.scene.arguments import read_arguments
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.robot import Robot
-from palaestra_sim.scene.robot_reader import RobotParts
+from palaestra_sim.scene.robot_parts import RobotParts
 from palaestra_sim.scene.validation import LeaveOut, NodeReader
 from palaestra_sim.scene.visuals import View
 from palaestra_sim.world import mjcf

@@ -21,7 +21,7 @@ from palaestra_sim.scene.motion import Motion
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.sensor_rays import Beam
-from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.visual_rays import Glance
 
@@ -84,7 +84,7 @@ class DevicePart:
         name: the name of the device in the world file, or else the default name of its type.
         place: the device's frame, in the robot's frame; for a device on a joint, the frame of the joint.
         shaft: the joint on which the device is; None if the device is not on a joint.
-        outline: the shapes with which the robot collides.
+        shapes: the shapes of the device's boundingObject; empty for a device that collides with nothing.
         measured: the links whose force on the robot is measured.
         forces: whether the physics has forces.
     """
@@ -95,7 +95,7 @@ class DevicePart:
     name: str
     place: Frame
     shaft: Shaft | None
-    outline: list[Shape]
+    shapes: Sequence[Shape]
     measured: list[Link]
     forces: bool
 
@@ -141,12 +141,6 @@ class DevicePart:
     def lack(self, fact: str) -> None:
         """Record that this device cannot be simulated."""
         self.lacks(self.node, fact)
-
-    def take_outline(self) -> list[Shape]:
-        """Return the shapes of the device's boundingObject, after adding them to the robot's outline."""
-        shapes = list(bounding_shapes(self.reading, self.node, self.place))
-        self.outline += shapes
-        return shapes
 
     def measure(self) -> Link:
         """Return this device's link, after adding it to the links whose force on the robot is measured."""

@@ -41,7 +41,7 @@ class TouchSensor:
 
     name: str
     model: str
-    outline: list[Shape]
+    outline: Sequence[Shape]
     type: int = _BUMPER
     link: Link | None = None
     table: LookupTable | None = field(default_factory=lambda: lookup_table(*_TABLE))
@@ -82,11 +82,10 @@ def _read(part: DevicePart) -> TouchSensor:
     kind = _TYPES.index(type_name) if type_name in _TYPES else _BUMPER
     if type_name != "bumper" and not part.forces:
         part.lack("a touch sensor that measures force")
-    # As in Webots, a bumper without a Physics node is a part of the robot, so its shapes join the outline.
     sensor = TouchSensor(
         name=part.name,
         model=part.text("model"),
-        outline=part.take_outline(),
+        outline=part.shapes,
         type=kind,
         of_old_axes=of_old_axes(part.node),
     )

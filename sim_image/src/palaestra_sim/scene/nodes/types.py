@@ -20,6 +20,7 @@ Recognition SliderJoint Slot Solid SolidReference Track TrackWheel WorldInfo Zoo
 Microphone Radio
 """
 _NUMBERS: Final = {name: number for number, name in enumerate(_NUMBERED.split())}
+BASE_TYPES: Final = frozenset(_NUMBERS) - {"-"}
 
 
 def type_number(type_name: str) -> int:
@@ -29,4 +30,4 @@ def type_number(type_name: str) -> int:
 
 def is_base_type(type_name: str) -> bool:
     """Return whether Webots has a base type of this name, so that it is not a PROTO."""
-    return type_name in _NUMBERS
+    return type_name in BASE_TYPES

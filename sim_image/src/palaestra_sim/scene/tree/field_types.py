@@ -1,8 +1,7 @@
 """Node types as a supervisor sees them: their fields, and the type of each field.
 
-The fields and defaults come from resources/nodes/*.wrl of Webots R2023b. This module lists only the types in
-the stub's worlds; `devices` lists the types of devices. A field that is not listed exists if the world file
-sets it, and its type is derived from its value.
+`node_fields` and `devices` list the fields of all base types. The fields of an older release are not listed:
+such a field exists if the world file sets it, and its type is derived from its value.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from typing import Final, NamedTuple
 
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
+from palaestra_sim.scene.tree.node_fields import NODE_FIELDS, SOLID_FIELDS
 
 
 class FieldType(IntEnum):
@@ -68,73 +68,6 @@ class FieldKind(NamedTuple):
         return ("MF" if self.multiple else "SF") + _NAMES[self.type]
 
 
-_POSE = """
-translation SFVec3f 0 0 0; rotation SFRotation 0 0 1 0; children MFNode;
-translationStep SFFloat 0.01; rotationStep SFFloat 0.261799387
-"""
-_SOLID = f"""{_POSE};
-name SFString solid; model SFString; description SFString; contactMaterial SFString default;
-immersionProperties MFNode; boundingObject SFNode; physics SFNode; locked SFBool FALSE;
-radarCrossSection SFFloat 0; recognitionColors MFColor
-"""
-_LIGHT = """
-ambientIntensity SFFloat 0; color SFColor 1 1 1; intensity SFFloat 1; on SFBool TRUE;
-castShadows SFBool FALSE
-"""
-_FIELDS: Final = {
-    "WorldInfo": """
-        info MFString; title SFString; window SFString; gravity SFFloat 9.81; CFM SFFloat 0.00001;
-        ERP SFFloat 0.2; physics SFString; basicTimeStep SFFloat 32; FPS SFFloat 60;
-        optimalThreadCount SFInt32 1; physicsDisableTime SFFloat 1;
-        physicsDisableLinearThreshold SFFloat 0.01; physicsDisableAngularThreshold SFFloat 0.01;
-        defaultDamping SFNode; inkEvaporation SFFloat 0; coordinateSystem SFString ENU;
-        gpsCoordinateSystem SFString local; gpsReference SFVec3f 0 0 0; lineScale SFFloat 0.1;
-        dragForceScale SFFloat 30; dragTorqueScale SFFloat 5; randomSeed SFInt32 0;
-        contactProperties MFNode""",
-    "Viewpoint": """
-        fieldOfView SFFloat 0.785398; orientation SFRotation 0 0 1 0; position SFVec3f 0 0 0;
-        description SFString; near SFFloat 0.05; far SFFloat 0; exposure SFFloat 1; follow SFString;
-        followType SFString Tracking Shot; followSmoothness SFFloat 0.5; lensFlare SFNode;
-        ambientOcclusionRadius SFFloat 2; bloomThreshold SFFloat -1""",
-    "Background": "skyColor MFColor; luminosity SFFloat 1",
-    "DirectionalLight": f"{_LIGHT}; direction SFVec3f 0 0 -1",
-    "PointLight": f"{_LIGHT}; attenuation SFVec3f 1 0 0; location SFVec3f 0 0 0; radius SFFloat 100",
-    "Group": "children MFNode",
-    "Pose": _POSE,
-    "Transform": f"{_POSE}; scale SFVec3f 1 1 1",
-    "Solid": _SOLID,
-    "Robot": f"""{_SOLID};
-        name SFString robot; controller SFString <generic>; controllerArgs MFString;
-        customData SFString; supervisor SFBool FALSE; synchronization SFBool TRUE; battery MFFloat;
-        cpuConsumption SFFloat 10; selfCollision SFBool FALSE; window SFString <generic>;
-        remoteControl SFString <none>""",
-    "HingeJoint": "jointParameters SFNode; device MFNode; endPoint SFNode; position SFFloat 0",
-    "HingeJointParameters": """
-        position SFFloat 0; axis SFVec3f 1 0 0; anchor SFVec3f 0 0 0; minStop SFFloat 0;
-        maxStop SFFloat 0; springConstant SFFloat 0; dampingConstant SFFloat 0;
-        staticFriction SFFloat 0; suspensionSpringConstant SFFloat 0;
-        suspensionDampingConstant SFFloat 0; suspensionAxis SFVec3f 1 0 0; stopERP SFFloat -1;
-        stopCFM SFFloat -1""",
-    "Physics": """
-        density SFFloat 1000; mass SFFloat -1; centerOfMass MFVec3f; inertiaMatrix MFVec3f;
-        damping SFNode""",
-    "ContactProperties": """
-        material1 SFString default; material2 SFString default; coulombFriction MFFloat 1;
-        frictionRotation SFVec2f 0 0; rollingFriction SFVec3f 0 0 0; bounce SFFloat 0.5;
-        bounceVelocity SFFloat 0.01; forceDependentSlip MFFloat; softERP SFFloat 0.2;
-        softCFM SFFloat 0.001""",
-    "Shape": """
-        appearance SFNode; geometry SFNode; castShadows SFBool TRUE; isPickable SFBool TRUE""",
-    "PBRAppearance": """
-        baseColor SFColor 1 1 1; transparency SFFloat 0; roughness SFFloat 0; metalness SFFloat 1;
-        name SFString PBRAppearance""",
-    "Box": "size SFVec3f 0.1 0.1 0.1",
-    "Cylinder": """
-        bottom SFBool TRUE; height SFFloat 2; radius SFFloat 1; side SFBool TRUE; top SFBool TRUE;
-        subdivision SFInt32 36""",
-    "Plane": "size SFVec2f 1 1",
-}
-
 _WITHOUT_EFFECT: Final = {
     "WorldInfo": "CFM ERP physics defaultDamping inkEvaporation",
     "Solid": "immersionProperties",
@@ -187,9 +120,9 @@ def field_kinds(type_name: str) -> dict[str, FieldKind]:
 def _declared(type_name: str) -> str:
     kind = DEVICES.get(type_name)
     if kind is None:
-        return _FIELDS.get(type_name, "")
+        return NODE_FIELDS.get(type_name, "")
     own = f"name SFString {kind.name}; {kind.fields}"
-    return f"{_SOLID}; {own}" if kind.body else own
+    return f"{SOLID_FIELDS}; {own}" if kind.body else own
 
 
 def kinds_of(node: SceneNode) -> dict[str, FieldKind]:
