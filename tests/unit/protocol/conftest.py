@@ -7,6 +7,7 @@ from palaestra_protocol.control import LastExit, RobotName, SidecarState, Simula
 from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
+    EvaluationStatus,
     FaultKind,
     FaultRecord,
     Role,
@@ -23,6 +24,12 @@ shares = st.floats(0.0, 1.0)
 times = st.datetimes().map(lambda time: f"{time.isoformat(timespec='seconds')}Z")
 
 checkpoints = st.builds(CheckpointStatus, step=counts, time=times)
+evaluations = st.builds(
+    EvaluationStatus,
+    step=counts,
+    success_rate=st.none() | shares,
+    mean_return=st.none() | st.floats(allow_nan=False, allow_infinity=False),
+)
 lines = st.text(st.characters(exclude_categories=["Cs"]), max_size=200)
 fault_records = st.builds(
     FaultRecord,
@@ -94,6 +101,7 @@ SHAPES = {
         goodput=st.dictionaries(st.sampled_from([cause.value for cause in Cause]), st.floats(0.0, 1e9)),
         steps_lost=counts,
         left_out=st.lists(lines, max_size=16).map(tuple),
+        last_evaluation=st.none() | evaluations,
     ),
     Termination: st.builds(
         Termination,
@@ -105,6 +113,7 @@ SHAPES = {
         restarts=st.none() | counts,
         log=st.lists(lines, max_size=10).map(tuple),
         faults=st.lists(fault_records, max_size=10).map(tuple),
+        last_evaluation=st.none() | evaluations,
     ),
 }
 

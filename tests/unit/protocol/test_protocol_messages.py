@@ -20,6 +20,7 @@ from palaestra_protocol.control import (
 from palaestra_protocol.fields import MOST_BYTES, decoded
 from palaestra_protocol.pod.status import (
     Cause,
+    EvaluationStatus,
     ExitCode,
     FaultKind,
     SimulatorStatus,
@@ -218,6 +219,14 @@ def test_an_interval_travels_with_its_rate(status) -> None:
 
     assert TrainerStatus.from_json(status(success_interval=interval).to_json()).success_interval == interval
     assert Termination.from_message(word.to_message()).success_interval == interval
+
+
+def test_an_evaluation_is_written_only_after_it_was_made(status) -> None:
+    """Release 0.1.0 does not report evaluations, and a reader must not take a missing one for a bad one."""
+    evaluation = EvaluationStatus(step=40, mean_return=-1.5)
+
+    assert "last_evaluation" not in status().to_json()
+    assert TrainerStatus.from_json(status(last_evaluation=evaluation).to_json()).last_evaluation == evaluation
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Annotated, Self
 from palaestra_protocol.control import MOST_LEFT_OUT, SidecarState
 from palaestra_protocol.fields import MOST_COUNT, MOST_NAME, ProtocolError, decoded
 from palaestra_protocol.messages import (
+    AddedLater,
     ChoiceText,
     Flag,
     JsonMessage,
@@ -34,6 +35,7 @@ from palaestra_protocol.pod.enums import Cause, ExitCode, FaultKind, Role, Stand
 __all__ = [
     "Cause",
     "CheckpointStatus",
+    "EvaluationStatus",
     "ExitCode",
     "FaultKind",
     "FaultRecord",
@@ -63,6 +65,21 @@ class CheckpointStatus(JsonMessage):
 
     step: Annotated[int, Whole()]
     time: Annotated[str, Time()]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluationStatus(JsonMessage):
+    """One evaluation of a policy during training; a confirmation is not an evaluation.
+
+    Attributes:
+        step: number of valid environment steps from which the policy had learned.
+        success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
+        mean_return: mean return of the evaluation's episodes; None: the program does not report returns.
+    """
+
+    step: Annotated[int, Whole()]
+    success_rate: Annotated[float | None, Maybe(Number(0.0, 1.0))] = None
+    mean_return: Annotated[float | None, Maybe(Number())] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +150,8 @@ class TrainerStatus(JsonMessage):
             attempt resumed, and steps in a training or evaluation episode that a fault cut short.
         left_out: the nodes that the simulators leave out of their worlds, as text for people; each line
             begins with the name of the simulators' group.
+        last_evaluation: the newest evaluation; None before the first evaluation, or if the trainer's release
+            does not report evaluations.
     """
 
     step: Annotated[int, Whole()]
@@ -154,6 +173,7 @@ class TrainerStatus(JsonMessage):
     )
     steps_lost: Annotated[int, Maybe(Whole())] = 0
     left_out: Annotated[tuple[str, ...], Maybe(Lines(MOST_NAME, MOST_LEFT_OUT))] = ()
+    last_evaluation: Annotated[EvaluationStatus | None, AddedLater(Part(EvaluationStatus))] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,6 +212,8 @@ class Termination(JsonMessage):
         restarts: number of restarts of simulators after faults in this attempt; None if it is unknown.
         log: the last lines of the trainer's log, at most ten, the newest last.
         faults: the last faults of this attempt, at most ten, the newest last.
+        last_evaluation: the newest evaluation; None without an evaluation, or if the trainer's release does
+            not report evaluations.
     """
 
     step: Annotated[int, Whole()]
@@ -203,6 +225,7 @@ class Termination(JsonMessage):
     restarts: Annotated[int | None, Maybe(Whole())] = None
     log: Annotated[tuple[str, ...], Maybe(NewestLines(MOST_LINE, MOST_LINES))] = ()
     faults: Annotated[tuple[FaultRecord, ...], Maybe(NewestPartList(FaultRecord, MOST_FAULTS))] = ()
+    last_evaluation: Annotated[EvaluationStatus | None, AddedLater(Part(EvaluationStatus))] = None
 
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes.

@@ -9,10 +9,12 @@ import signal
 from stable_baselines3.common.save_util import load_from_zip_file
 from torch import equal
 
+from palaestra_protocol.pod.status import EvaluationStatus
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.job.run_directory import drop_lines, read_lines
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import best_of
+from tests.unit.trainer.run.test_run_resume import signal_after
 
 EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # the seeds of every evaluation of these runs
 GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}
@@ -164,3 +166,37 @@ def test_the_summary_is_that_of_model_zip_also_after_a_resume(play, job, directo
     result = summary(directory)
     assert best_of(directory) == before
     assert (result["best_step"], result["success_rate"]) == (before.step, 1.0)
+
+
+def test_the_last_evaluation_is_reported_and_not_the_confirmation_after_it(play, job, directory, last_word):
+    """A sweep compares evaluations, and a confirmation plays other episodes, often of an earlier policy."""
+    play(job(evaluation=GOAL), report=lucky)
+
+    *_, line = read_lines(directory.evaluations)
+    told = EvaluationStatus(step=100, success_rate=1.0, mean_return=line["mean_return"])
+    assert last_word().last_evaluation == told
+    assert last_word().success_rate == 0.0
+
+
+def test_the_last_evaluation_is_known_again_after_a_resume(play, job, last_word):
+    """The operator may have lost it, for example with the status of a job that was restored from a backup."""
+    play(job(), on_step=signal_after(70))
+    before = last_word().last_evaluation
+    play(job(), on_step=signal_after(2))
+    resumed = last_word().last_evaluation
+    play(job())
+    play(job())
+
+    assert (before.step, resumed) == (40, before)
+    assert (last_word().reason, last_word().last_evaluation.step) == ("Completed: before", 100)
+
+
+def test_an_evaluation_that_was_cut_is_not_the_last_one(play, job, last_word):
+    """The resumed attempt repeats it, and its result may differ."""
+    in_confirmation = 4 * 8 + 3  # an episode of the corridor has eight steps at most
+    cut = signal_after(in_confirmation)
+
+    play(job(evaluation=GOAL), report=lambda *_: {"is_success": True}, on_step=cut, of="evaluate-0")
+
+    assert last_word().success_rate == 1.0
+    assert last_word().last_evaluation is None

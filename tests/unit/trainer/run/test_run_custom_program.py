@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_protocol.pod.status import Cause, Termination, TrainerStatus
+from palaestra_protocol.pod.status import Cause, EvaluationStatus, Termination, TrainerStatus
 from palaestra_trainer import report
 from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.run.custom_program import ProgramReport, reported
@@ -90,6 +90,7 @@ def test_a_program_that_reports_answers_as_the_built_in_loop_does(program, addre
     lines = answer(address, "/metrics").splitlines()
     assert (status.step, status.target, status.success_rate, status.phase) == (20, 1000, 0.5, "training")
     assert status.last_progress is not None
+    assert status.last_evaluation == EvaluationStatus(step=10, success_rate=0.5)
     assert "palaestra_trainer_steps_total 20.0" in lines
     assert answer(address, "/healthz") == "ok\n"
 
@@ -112,6 +113,7 @@ def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_pa
     word = Termination.from_message((tmp_path / "word").read_text())
     assert not before
     assert (word.step, word.success_rate) == (1000, 0.75)
+    assert word.last_evaluation == EvaluationStatus(step=1000, success_rate=0.75)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError,
 from palaestra_trainer.job.configuration import Configuration, dump
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import checkpoint
-from palaestra_trainer.run.best_model import Enough, forget_after
+from palaestra_trainer.run.best_model import Enough, forget_after, last_evaluation
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
 from palaestra_trainer.run.checkpoint import SavedCheckpoint
@@ -117,7 +117,7 @@ def run(
     before = finished(directory, configuration)
     if before is not None:
         log.info("already finished", **before)
-        write_last_word(last_word_of(before))
+        write_last_word(last_word_of(before, directory))
         return ExitCode.DONE
     return _reported(attempt.play(), attempt)
 
@@ -263,7 +263,7 @@ class Attempt:
             self._progress.counters = journal.regained(0, Counters())
             return
         step, saved = found.manifest.step, Counters.from_json(found.manifest.counters)
-        self._progress.resumed(step, journal.regained(step, saved))
+        self._progress.resumed(step, journal.regained(step, saved), last_evaluation(self._directory, step))
 
     def _newest(self) -> SavedCheckpoint | None:
         checkpoint.tidy(self._directory.checkpoints)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import ceil
@@ -20,7 +20,7 @@ from typing import Any
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_protocol.pod.status import Cause
+from palaestra_protocol.pod.status import Cause, EvaluationStatus
 from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer import algorithms
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult, evaluate_on_all
@@ -104,7 +104,9 @@ class Selection:
         reached = goal is not None and self._confirmed(evaluation, goal, step)
         if reached or self._best is None or evaluation.score > self._best.score:
             self._keep(evaluation, step)
-        append_line(self._directory.evaluations, {"step": step} | evaluation.record())
+        line = {"step": step} | evaluation.record()
+        append_line(self._directory.evaluations, line)
+        self._run.progress.last_evaluation = _status_of(line)
         if reached:
             raise Enough(f"{_in_words(self._run.progress)} at step {step}")
 
@@ -251,13 +253,20 @@ def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None
     return next(found, None)
 
 
+def last_evaluation(directory: RunDirectory, step: int) -> EvaluationStatus | None:
+    """Return the last evaluation up to `step`; None if the run has no such evaluation."""
+    lines = (line for line in read_lines(directory.evaluations) if line["step"] <= step)
+    newest = max(lines, key=lambda line: int(line["step"]), default=None)
+    return None if newest is None else _status_of(newest)
+
+
 def last_evaluated(directory: RunDirectory, step: int) -> int:
     """Return the step of the last evaluation up to `step`; 0 if there is no evaluation.
 
     The file evaluations.jsonl does not contain an interrupted evaluation, so a resumed attempt repeats it.
     """
-    steps = (int(line["step"]) for line in read_lines(directory.evaluations))
-    return max((each for each in steps if each <= step), default=0)
+    evaluation = last_evaluation(directory, step)
+    return 0 if evaluation is None else evaluation.step
 
 
 def forget_after(directory: RunDirectory, step: int) -> None:
@@ -265,6 +274,13 @@ def forget_after(directory: RunDirectory, step: int) -> None:
     drop_lines(directory.evaluations, lambda line: line["step"] > step)
     evaluated = last_evaluated(directory, step)
     drop_lines(directory.confirmations, lambda line: line["confirmed_at"] > evaluated)
+
+
+def _status_of(line: Mapping[str, Any]) -> EvaluationStatus:
+    """Return a line of evaluations.jsonl as it is reported."""
+    return EvaluationStatus(
+        step=line["step"], success_rate=line["success_rate"], mean_return=line["mean_return"]
+    )
 
 
 def _in_words(progress: Progress) -> str:

@@ -17,7 +17,7 @@ from functools import cache
 from typing import Any
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_protocol.pod.status import Cause, Termination
+from palaestra_protocol.pod.status import Cause, EvaluationStatus, Termination
 from palaestra_trainer.environments.infos import ours
 from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.run.telemetry.metrics import constants
@@ -61,6 +61,7 @@ class ProgramReport(Progress):
         self.stepped(1)
         if success_rate is not None:
             self.success_rate = success_rate
+            self.last_evaluation = EvaluationStatus(step=step, success_rate=success_rate)
 
     def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
         """Count a step of collecting environments by the infos of its rows; ignore other environments."""
@@ -85,7 +86,9 @@ def report(step: int, success_rate: float | None) -> None:
         progress.reports(step, success_rate)
     if step >= progress.target:
         done = "Completed: all steps are done"
-        write_last_word(Termination(step=step, reason=done, success_rate=progress.success_rate))
+        rate, evaluation = progress.success_rate, progress.last_evaluation
+        word = Termination(step=step, reason=done, success_rate=rate, last_evaluation=evaluation)
+        write_last_word(word)
 
 
 def reported(configuration: Configuration) -> ProgramReport:

@@ -30,6 +30,7 @@ def last_word(progress: Progress, end: End) -> Termination:
         step=progress.step,
         success_rate=progress.success_rate,
         success_interval=progress.success_interval,
+        last_evaluation=progress.last_evaluation,
         reason=f"{end.reason}: {end.message}",
         last_checkpoint=progress.checkpoint,
         attempt=progress.attempt,

@@ -11,7 +11,7 @@ from palaestra_protocol.pod.status import SuccessInterval, Termination
 from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
-from palaestra_trainer.run.best_model import best_of, confirmation_of
+from palaestra_trainer.run.best_model import best_of, confirmation_of, last_evaluation
 from palaestra_trainer.run.telemetry.goodput import trained_share
 from palaestra_trainer.run.telemetry.progress import Progress
 
@@ -72,14 +72,15 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
     return {name: value for name, value in content.items() if name != "event"}  # structlog adds this key
 
 
-def last_word_of(summary: dict[str, Any]) -> Termination:
-    """Return the termination message of an attempt whose run is already finished."""
+def last_word_of(summary: dict[str, Any], directory: RunDirectory) -> Termination:
+    """Return the termination message of an attempt whose run, in `directory`, is already finished."""
     interval = summary["success_interval"]
     return Termination(
         step=summary["steps"],
         reason="Completed: before",
         success_rate=summary["success_rate"],
         success_interval=None if interval is None else SuccessInterval.from_json(interval),
+        last_evaluation=last_evaluation(directory, summary["steps"]),
     )
 
 

@@ -20,6 +20,7 @@ from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
+    EvaluationStatus,
     FaultKind,
     FaultRecord,
     SuccessInterval,
@@ -104,6 +105,7 @@ class Progress:
         success_rate: success rate of this attempt's last evaluation or confirmation; None before the first
             evaluation, or if the environment does not report success.
         success_interval: the interval around `success_rate`; None if the rate is None.
+        last_evaluation: the newest evaluation, over all attempts; None before the first evaluation.
         checkpoint: the newest checkpoint; None before the first checkpoint.
         attempt: number of this attempt in the run directory; None before the attempt is recorded.
         figures: values of this attempt only, for /metrics.
@@ -122,6 +124,7 @@ class Progress:
         self.counters = Counters()
         self.success_rate: float | None = None
         self.success_interval: SuccessInterval | None = None
+        self.last_evaluation: EvaluationStatus | None = None
         self.checkpoint: CheckpointStatus | None = None
         self.attempt: int | None = None
         self.figures = MetricValues()
@@ -156,9 +159,10 @@ class Progress:
         self._moved = self._clock()
         self._moved_at = time.time()
 
-    def resumed(self, step: int, counters: Counters) -> None:
-        """Continue with the step and counters of the checkpoint at `step`."""
+    def resumed(self, step: int, counters: Counters, evaluation: EvaluationStatus | None = None) -> None:
+        """Continue with the checkpoint at `step`, its counters and the last evaluation before it."""
         self.step = step
+        self.last_evaluation = evaluation
         self.counters = replace(counters, faults=Counter(counters.faults))
         self.saved(step)
 
@@ -361,6 +365,7 @@ class Progress:
                 goodput={cause: round(seconds, 3) for cause, seconds in counters.goodput.items()},
                 steps_lost=counters.steps_lost,
                 left_out=self._standings.left_out(),
+                last_evaluation=self.last_evaluation,
             )
 
 
