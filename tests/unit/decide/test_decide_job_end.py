@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.api.status import Phase
-from palaestra_protocol.pod.status import SuccessInterval
+from palaestra_protocol.pod.status import EvaluationStatus, SuccessInterval
 
 
 @pytest.mark.parametrize(
@@ -206,13 +206,15 @@ def test_what_the_trainer_said_last_stays_in_the_status(training, last_word, sim
     scene, pod = training()
     scene.poll(pod, step=50, target=100, mean_return=1.5, steps_per_second=20.0, simulators=(simulator(),))
     scene.settle(1)
-    scene.end(pod, 0, last_word(step=100, success_rate=0.9))
+    evaluation = EvaluationStatus(step=100, success_rate=0.8, mean_return=3.5)
+    scene.end(pod, 0, last_word(step=100, success_rate=0.9, last_evaluation=evaluation))
     scene.end_job("Complete")
 
     scene.settle(1)
 
     replica = scene.replica()
     assert (replica.step, replica.target, replica.success_rate) == (100, 100, 0.9)
+    assert (replica.last_evaluation.step, replica.last_evaluation.mean_return) == (100, 3.5)
     assert (replica.mean_return, replica.steps_per_second) == (1.5, None)
 
 

@@ -6,8 +6,9 @@ from palaestra.api.reasons import Reason
 from palaestra.decide import SetSuspend, accept, lacking_claims
 from palaestra.observe import Objects, observe
 from palaestra.plan.claim import claim_name
-from palaestra_protocol.pod.status import CheckpointStatus
+from palaestra_protocol.pod.status import CheckpointStatus, EvaluationStatus
 
+EVALUATED = EvaluationStatus(step=20000, success_rate=0.9, mean_return=1.5)
 SAVED = CheckpointStatus(step=21000, time="2026-01-31T12:00:00Z")
 WORD = "palaestra.dev/restart-lost-runs"
 
@@ -15,7 +16,7 @@ WORD = "palaestra.dev/restart-lost-runs"
 def trained(training, **spec):
     """Return a scene whose replica has trained 21,812 steps and is suspended."""
     scene, pod = training(**spec)
-    scene.poll(pod, step=21812, last_checkpoint=SAVED)
+    scene.poll(pod, step=21812, last_checkpoint=SAVED, last_evaluation=EVALUATED)
     scene.settle()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -120,6 +121,7 @@ def test_a_person_s_word_begins_at_step_zero_again(training):
     assert scene.objects["claims"]
     assert scene.job()["spec"]["suspend"] is False
     assert (scene.replica().step, scene.replica().furthest_step) == (None, None)
+    assert scene.replica().last_evaluation is None
     assert (scene.replica().lost.step, scene.replica().lost.restarted) == (21000, scene.now)
     assert scene.status.lost_runs_restarted == "2026-01-31T13:00:00Z"
 

@@ -5,13 +5,14 @@ import json
 import pytest
 from pydantic.alias_generators import to_camel
 
-from palaestra.api.attempt_status import Faults, Goodput
+from palaestra.api.attempt_status import Faults, Goodput, LastEvaluation
 from palaestra.api.status import ConditionStatus, Phase
 from palaestra.decide import accept, prepare
 from palaestra.observe import Objects, observe
 from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
+    EvaluationStatus,
     FaultKind,
     FaultRecord,
     SuccessInterval,
@@ -61,6 +62,31 @@ def test_figures_have_the_four_decimals_that_people_read(training):
     replica = scene.replica()
     assert (replica.success_rate, replica.mean_return) == (0.3333, -0.0771)
     assert replica.steps_per_second == 251.2346
+
+
+def test_the_last_evaluation_is_kept_until_the_next_one(training):
+    """A sweep compares evaluations, and an attempt of an older trainer image reports none of them."""
+    scene, pod = training()
+    scene.poll(pod, step=30, last_evaluation=EvaluationStatus(step=20, success_rate=1 / 3, mean_return=-1.5))
+    scene.settle()
+    scene.poll(pod, step=31, success_rate=0.5, mean_return=2.0)
+
+    scene.settle()
+
+    kept = LastEvaluation(step=20, success_rate=0.3333, mean_return=-1.5)
+    assert scene.replica().last_evaluation == kept
+
+
+def test_an_evaluation_without_success_is_not_a_failed_one(training):
+    """The figures of two evaluations must not be mixed, so an unknown figure does not keep the old value."""
+    scene, pod = training()
+    scene.poll(pod, step=30, last_evaluation=EvaluationStatus(step=20, success_rate=0.5, mean_return=1.0))
+    scene.settle()
+    scene.poll(pod, step=60, last_evaluation=EvaluationStatus(step=40, mean_return=2.0))
+
+    scene.settle()
+
+    assert scene.replica().last_evaluation == LastEvaluation(step=40, mean_return=2.0)
 
 
 def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):

@@ -88,6 +88,13 @@ def test_progress_waits_for_half_a_minute(change):
     assert write_in_s(OLD, new, None) == 0
 
 
+def test_evaluations_after_the_first_one_wait_too():
+    """Some jobs evaluate every few seconds."""
+    old = changed({"lastEvaluation": {"step": 5, "meanReturn": 1.0}})
+
+    assert write_in_s(old, changed({"lastEvaluation": {"step": 10, "meanReturn": 2.0}}), 29) == 1
+
+
 def queued(words):
     """Return the status of a job that waits in a queue, with Kueue's message."""
     told = {"reason": "Queued", "message": f"waits in queue trainings for Kueue: {words}"}
@@ -126,6 +133,7 @@ def test_a_number_in_another_message_is_news():
         {"target": 100},
         {"successRate": 0.0},
         {"lastCheckpoint": {"step": 5, "time": "2026-01-31T12:00:00Z"}},
+        {"lastEvaluation": {"step": 10, "meanReturn": 2.0}},
         {"lastAttempt": {"attempt": 1, "reason": "Disrupted"}},
         {"memoryKills": [{"container": "trainer", "times": 1}]},
     ],

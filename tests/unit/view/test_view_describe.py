@@ -35,6 +35,20 @@ def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none()
     )
 
 
+def test_the_last_evaluation_has_its_own_return_next_to_that_of_training():
+    """The mean return of training episodes includes exploration, so the two returns may differ much."""
+    evaluation = {"step": 10_000, "meanReturn": 4.5}
+
+    lines = told(running_job(lastEvaluation=evaluation))
+    successful = told(running_job(lastEvaluation=evaluation | {"successRate": 0.35}))
+    program = told(running_job(lastEvaluation={"step": 10_000, "successRate": 0.35}))
+
+    assert "Mean return:    3.25" in lines
+    assert "Evaluation:     step 10,000, mean return 4.5" in lines
+    assert "Evaluation:     step 10,000, success rate 35%, mean return 4.5" in successful
+    assert "Evaluation:     step 10,000, success rate 35%" in program
+
+
 def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
     """A simulator that the trainer has given up shows `given up` in place of its last state."""
     lines = told(running_job())

@@ -1,4 +1,4 @@
-"""The history of a replica in the status: end of the last attempt, faults, and time by activity.
+"""The history of a replica in the status: last evaluation and attempt, faults, and time by activity.
 
 Kubernetes deletes logs with their pod, so the status keeps the last lines. Every list and text has a maximum
 length, because etcd limits the size of an object and people read the status.
@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from palaestra.api.fields import Count, Listed, Sentence, Word
+from palaestra.api.fields import Count, Fraction, Listed, Sentence, Word
 from palaestra.api.model import StatusModel
 from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES
 
@@ -60,6 +60,19 @@ class LastAttempt(StatusModel):
 
     restarts: Count = 0
     """Number of restarts of simulators after faults in this attempt."""
+
+
+class LastEvaluation(StatusModel):
+    """The newest evaluation during training; a confirmation is not an evaluation."""
+
+    step: Count
+    """Environment steps trained when the policy was evaluated."""
+
+    success_rate: Fraction | None = None
+    """Share of successful episodes, 0 to 1; absent: the environment reports no success."""
+
+    mean_return: float | None = None
+    """Mean return of the evaluation's episodes; absent: the trainer reports no returns."""
 
 
 class Faults(StatusModel):

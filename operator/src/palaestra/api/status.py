@@ -14,7 +14,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from palaestra.api.attempt_status import Faults, Goodput, LastAttempt, MemoryKills
+from palaestra.api.attempt_status import Faults, Goodput, LastAttempt, LastEvaluation, MemoryKills
 from palaestra.api.fields import KNOWN_ITEMS, Count, Fraction, Image, Listed, Sentence, Word, Words
 from palaestra.api.model import StatusModel
 from palaestra_protocol.control import SidecarState
@@ -236,6 +236,9 @@ class ReplicaStatus(StatusModel):
 
     mean_return: float | None = None
     """Mean return of recent training episodes; absent: no episode has ended yet."""
+
+    last_evaluation: LastEvaluation | None = None
+    """Newest evaluation; absent: none yet, or the trainer's release does not report it."""
 
     steps_per_second: Annotated[float, Field(ge=0)] | None = None
     """Recent environment steps per second; absent: not known, or not running."""

@@ -55,6 +55,7 @@ def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaSt
         "success_rate",
         "success_interval",
         "mean_return",
+        "last_evaluation",
     )
     given_up = lost.model_copy(update={"restarted": now, "pod": replica.pod})
     return replica.model_copy(update={**dict.fromkeys(forgotten), "fruitless": 0, "lost": given_up})

@@ -7,7 +7,7 @@ speed is removed, because an old speed is not the current speed.
 from datetime import datetime
 
 from palaestra.api import Role
-from palaestra.api.attempt_status import Faults, Goodput
+from palaestra.api.attempt_status import Faults, Goodput, LastEvaluation
 from palaestra.api.status import (
     TERMINAL,
     LastCheckpoint,
@@ -22,7 +22,7 @@ from palaestra.decide.restart_counts import of_this_run
 from palaestra.observe.json_access import MOST_COUNT, as_time
 from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol
-from palaestra_protocol.pod.status import CheckpointStatus, Termination, TrainerStatus
+from palaestra_protocol.pod.status import CheckpointStatus, EvaluationStatus, Termination, TrainerStatus
 
 EVALUATING = "evaluating"  # the trainer's phase during an evaluation, in which the trainer does not learn
 LONGEST_NAME = 63  # characters of a simulator's name; the names in a plan have 23 characters at most
@@ -47,6 +47,7 @@ def progress(situation: ReplicaContext, phase: Phase) -> dict[str, object]:
         fields["step"] = step
         fields["success_rate"] = _figure(told_last.success_rate, situation.old.success_rate)
         fields["success_interval"] = _interval(told_last.success_interval) or situation.old.success_interval
+        fields["last_evaluation"] = _evaluation(told_last.last_evaluation) or situation.old.last_evaluation
         fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or situation.old.last_checkpoint
     if polled is not None and ended_with is None:
         fields |= {
@@ -137,6 +138,16 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
     if checkpoint is None or at is None:
         return None
     return LastCheckpoint(step=min(checkpoint.step, MOST_COUNT), time=at)
+
+
+def _evaluation(evaluation: EvaluationStatus | None) -> LastEvaluation | None:
+    if evaluation is None:
+        return None
+    return LastEvaluation(
+        step=min(evaluation.step, MOST_COUNT),
+        success_rate=_figure(evaluation.success_rate, None),
+        mean_return=_figure(evaluation.mean_return, None),
+    )
 
 
 def _figure(new: float | None, old: float | None) -> float | None:

@@ -25,11 +25,11 @@ PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written together with other changes, never alone
 _OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
 _FIRST = frozenset(  # a first value of these fields is written at once; later values count as progress
-    {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
+    {"step", "target", "successRate", "successInterval", "lastEvaluation", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(
     {"step", "target", "successRate", "successInterval", "meanReturn", "stepsPerSecond", "simulators",
-     "lastCheckpoint", "node",
+     "lastEvaluation", "lastCheckpoint", "node",
      "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
 _AMOUNT = re.compile(r"\d[\w.]*")  # an amount, such as 425m or 1.5Gi

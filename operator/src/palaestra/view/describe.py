@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 
 from palaestra.api import Role, TrainingJob
-from palaestra.api.attempt_status import Goodput, LastAttempt
+from palaestra.api.attempt_status import Goodput, LastAttempt, LastEvaluation
 from palaestra.api.status import Condition, LostPart, LostRun, ReplicaStatus, SuccessInterval
 from palaestra.client import Event
 from palaestra.view.durations import ago, short
@@ -101,6 +101,8 @@ def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
         yield "Success rate", _success(replica.success_rate, replica.success_interval)
     if replica.mean_return is not None:
         yield "Mean return", f"{replica.mean_return:.4g}"
+    if replica.last_evaluation is not None:
+        yield "Evaluation", _evaluation(replica.last_evaluation)
     if replica.last_checkpoint is not None:
         yield "Checkpoint", f"step {replica.last_checkpoint.step:,}, {ago(replica.last_checkpoint.time, now)}"
     yield "Progress", ago(replica.last_progress, now)
@@ -137,6 +139,15 @@ def _success(rate: float, interval: SuccessInterval | None) -> str:
     return (
         f"{rate:.0%} (95% interval {interval.low:.0%} to {interval.high:.0%}, {interval.episodes} episodes)"
     )
+
+
+def _evaluation(evaluation: LastEvaluation) -> str:
+    text = f"step {evaluation.step:,}"
+    if evaluation.success_rate is not None:
+        text += f", success rate {evaluation.success_rate:.0%}"
+    if evaluation.mean_return is not None:
+        text += f", mean return {evaluation.mean_return:.4g}"
+    return text
 
 
 def _lost(lost: LostRun, now: datetime) -> str:
