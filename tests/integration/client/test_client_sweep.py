@@ -36,8 +36,9 @@ def file(tmp_path):
 
 
 def replica(index, phase, step=100, rate=None):
-    """Return the status of a replica."""
-    known = {} if rate is None else {"successRate": rate}
+    """Return the status of a replica, whose last evaluation had the success rate `rate`."""
+    evaluation = {"step": step, "successRate": rate, "meanReturn": -1.0}
+    known = {} if rate is None else {"successRate": rate, "lastEvaluation": evaluation}
     return {"index": index, "phase": phase, "step": step, **known}
 
 

@@ -10,13 +10,14 @@ from contextlib import suppress
 from typing import TypeVar
 
 from palaestra.api import TrainingJob
+from palaestra.api.attempt_status import LastEvaluation
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
 from palaestra.client import Client, ClientError, NoSuchJob
 from palaestra.client.wait_progress import current
 from palaestra.cluster.errors import Gone, ServerError, TooManyRequests, Unreachable
 from palaestra.errors import PalaestraError
 from palaestra.sweeps.model import LABEL
-from palaestra.sweeps.trial import Point, RunFigures, Trial, TrialFigures, TrialProgress
+from palaestra.sweeps.trial import Point, RunFigures, Trial, TrialFigures, TrialProgress, with_evaluation
 
 LOOK_S = 5.0  # seconds between two requests; the operator writes progress at most every 30 s
 DELETED_S = 300.0
@@ -152,18 +153,28 @@ class ClusterBackend:
         return answer
 
     def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:
-        """Return the figures of a replica; each change of a figure adds a point to the replica's curve."""
-        key = (trial.number, status.index)
-        curve = self._curves.get(key, ())
-        rate, mean = status.success_rate, status.mean_return
-        last = (curve[-1].success_rate, curve[-1].mean_return) if curve else (None, None)
-        if status.step is not None and (rate, mean) != last:
-            curve = (*curve, Point(step=status.step, success_rate=rate, mean_return=mean))
-            self._curves[key] = curve
+        """Return the figures of a replica; each new evaluation adds a point to the replica's curve.
+
+        The replica's own mean return is that of training episodes, which include exploration. So it is never
+        a point, and a trainer that does not report evaluations has no curve.
+        """
         return RunFigures(
-            curve=curve,
-            success_rate=rate,
+            curve=self._curve((trial.number, status.index), status.last_evaluation),
+            success_rate=status.success_rate,
             ended=status.phase in TERMINAL,
             succeeded=status.phase is Phase.SUCCEEDED,
             reason=status.message or "",
         )
+
+    def _curve(self, run: tuple[int, int], evaluation: LastEvaluation | None) -> tuple[Point, ...]:
+        """Return the evaluations of a run that this command has seen; () if the run has none."""
+        curve: tuple[Point, ...] = ()
+        if evaluation is not None:
+            newest = Point(
+                step=evaluation.step,
+                success_rate=evaluation.success_rate,
+                mean_return=evaluation.mean_return,
+            )
+            curve = with_evaluation(self._curves.get(run, ()), newest)
+        self._curves[run] = curve
+        return curve

@@ -37,6 +37,14 @@ class Point:
         return self.success_rate if objective is Objective.SUCCESS_RATE else self.mean_return
 
 
+def with_evaluation(curve: tuple[Point, ...], newest: Point) -> tuple[Point, ...]:
+    """Return the evaluations of a run with its newest evaluation at the end.
+
+    A resumed run repeats the evaluations after its checkpoint, so later points of `curve` are dropped.
+    """
+    return (*(point for point in curve if point.step < newest.step), newest)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
     """One run of a trial: its evaluations in order, and its result; `success_rate` may be unknown (None).
