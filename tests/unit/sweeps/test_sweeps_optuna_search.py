@@ -4,7 +4,7 @@ import pytest
 
 from palaestra.sweeps.optuna_search import JOURNAL, OptunaSearch
 from palaestra.sweeps.trial import TrialFigures, TrialProgress
-from tests.unit.sweeps.conftest import figures
+from tests.unit.sweeps.conftest import JOB, figures
 
 SPACE = {"seed": {"low": 1, "high": 99}, "trainer.steps": {"choice": [1000, 2000]}}
 
@@ -13,9 +13,10 @@ SPACE = {"seed": {"low": 1, "high": 99}, "trainer.steps": {"choice": [1000, 2000
 def search(sweep, tmp_path):
     """Return a function that opens the same search again from its journal."""
 
-    def make(trials=4, **optuna):
+    def make(trials=4, trainer=None, **optuna):
+        job = {**JOB, "spec": {**JOB["spec"], "trainer": trainer or {}}}
         return OptunaSearch(
-            sweep(random=SPACE, trials=trials, optuna={"startupTrials": 1, **optuna}), tmp_path
+            sweep(job=job, random=SPACE, trials=trials, optuna={"startupTrials": 1, **optuna}), tmp_path
         )
 
     return make
@@ -31,6 +32,23 @@ def test_a_trial_below_the_median_is_pruned(search) -> None:
     assert found.hopeless(other, figures({5: 0.1}, {5: 0.2}, ended=False))
     assert found.hopeless(other, figures({5: 0.1}, {5: 0.2}, ended=False))
     found.learn(other, TrialFigures(state=TrialProgress.PRUNED))
+
+
+def test_a_trial_is_pruned_whose_evaluations_are_at_other_steps(search) -> None:
+    """Optuna compares equal steps only, and in a cluster no two trials are seen at equal steps."""
+    found = search()
+    found.learn(found.next(), figures({2500: 0.9, 7700: 0.9}))
+
+    assert found.hopeless(found.next(), figures({5003: 0.1}, ended=False))
+
+
+def test_trials_without_a_number_of_steps_between_evaluations_are_compared_at_their_own_steps(search) -> None:
+    """A user's own program may report success rates, although the trainer makes no evaluations."""
+    found = search(trainer={"evaluation": {"everySteps": 0}})
+    found.learn(found.next(), figures({5003: 0.9}))
+
+    assert not found.hopeless(found.next(), figures({5000: 0.1}, ended=False))
+    assert found.hopeless(found.next(), figures({5003: 0.1}, ended=False))
 
 
 def test_nothing_is_pruned_if_the_sweep_does_not_want_it(search) -> None:

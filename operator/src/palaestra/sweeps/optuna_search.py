@@ -26,9 +26,15 @@ class OptunaSearch:
     """The trials that Optuna suggests."""
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open the journal in the sweep's folder; create it if it does not exist."""
+        """Open the journal in the sweep's folder; create it if it does not exist.
+
+        Raises:
+            SpecErrors: the job of a trial is invalid; the error lists every problem.
+        """
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._sweep = sweep
+        first = grid.trial(sweep, 0, next(grid.probes(sweep)))
+        self._every = first.job.spec.trainer.evaluation.every_steps
         self._space = {field: _space(values) for field, values in sweep.spec.random.items()}
         self._study = _study(sweep, folder)
         self._asked: dict[int, optuna.Trial] = {}
@@ -87,9 +93,16 @@ class OptunaSearch:
             self._study.tell(running.number, state=TrialState.FAIL)
 
     def _report(self, trial: Trial, figures: TrialFigures) -> None:
-        """Report the new medians over the seeds to Optuna."""
+        """Report the new medians over the seeds to Optuna.
+
+        Optuna compares a trial only with figures of other trials at an equal step. So all trials report at
+        the same steps: the multiples of the job's `evaluation.everySteps`.
+        """
         asked, reported = self._asked[trial.number], self._reported.setdefault(trial.number, set())
-        for step, value in figures.common(self._sweep.spec.objective).items():
+        objective = self._sweep.spec.objective
+        # A user's own program may report success rates although `everySteps` is 0.
+        medians = figures.on_grid(self._every, objective) if self._every else figures.common(objective)
+        for step, value in medians.items():
             if step not in reported:
                 asked.report(value, step)
                 reported.add(step)

@@ -1,7 +1,7 @@
 """One trial of a sweep, and the figures of its runs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from statistics import median
 from typing import Any, Self
@@ -65,6 +65,14 @@ class RunFigures:
         newest = next((point for point in reversed(self.curve) if point.step <= step), None)
         return None if newest is None else newest.value(objective)
 
+    def aligned(self, every: int) -> Self:
+        """Return the run with the step of each evaluation rounded down to a multiple of `every` steps.
+
+        A run evaluates at the end of the rollout that passes a multiple of `evaluation.everySteps`.
+        """
+        points = (replace(point, step=point.step // every * every) for point in self.curve)
+        return replace(self, curve=tuple(points))
+
     def value(self, objective: Objective) -> float | None:
         """Return the final policy's figure if it was measured, else the figure of the last evaluation."""
         if objective is Objective.SUCCESS_RATE and self.success_rate is not None:
@@ -120,6 +128,18 @@ class TrialFigures:
         steps = {point.step for run in self.runs for point in run.curve}
         values = {step: self.at(step, objective) for step in sorted(steps)}
         return {step: median(found) for step, found in values.items() if len(found) == len(self.runs)}
+
+    def on_grid(self, every: int, objective: Objective) -> Mapping[int, float]:
+        """Return the median over all seeds at each multiple of `every` steps that every run has reached.
+
+        Trials evaluate at different steps, and a reader may miss evaluations. So the steps are rounded down,
+        and a multiple without an evaluation has the newest figure before it. A multiple before the first
+        evaluation of a run has no median.
+        """
+        found = replace(self, runs=tuple(run.aligned(every) for run in self.runs))
+        reached = min((run.curve[-1].step if run.curve else -1 for run in found.runs), default=-1)
+        values = {step: found.at(step, objective) for step in range(0, reached + 1, every)}
+        return {step: median(known) for step, known in values.items() if len(known) == len(self.runs)}
 
     def at(self, step: int, objective: Objective) -> tuple[float, ...]:
         """Return the newest figure up to a step for each run that has reached the step."""
