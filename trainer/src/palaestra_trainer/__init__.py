@@ -108,7 +108,8 @@ def report(*, step: int, success_rate: float | None = None) -> None:
     Args:
         step: number of environment steps that the program has learned from in all attempts. The run is
             complete when this number reaches the job's `steps`.
-        success_rate: success rate of the last evaluation, 0 to 1; None keeps the rate of the previous report.
+        success_rate: success rate of an evaluation at this step, 0 to 1; None: no evaluation since the
+            previous report, whose rate is kept.
 
     Raises:
         ValueError: the step is negative, or the rate is not within 0 to 1.
