@@ -259,7 +259,8 @@ def test_the_report_counts_the_meshes_that_no_sensor_sees():
     """A lidar that looks through a wall trains a policy to drive into it."""
     shape = "Solid {{ children [ {} ] }} "
     read, unread = 'Shape { geometry Mesh { url "a.stl" } } ', 'Shape { geometry Mesh { url "a.dae" } } '
-    nodes = shape.format(read + 2 * unread + 'CadShape { url "a.obj" }')
+    unknown = "Shape { geometry Text { } } "
+    nodes = shape.format(read + 2 * unread + 'CadShape { url "a.obj" } ' + unknown)
     files = {"a.stl": binary(ONE), "a.dae": b"", "a.obj": b""}
     lines = [
         list(differences(Setting("stub").load(nodes + robot(device), files=files)))
@@ -267,7 +268,8 @@ def test_the_report_counts_the_meshes_that_no_sensor_sees():
     ]
 
     seen = "that no sensor sees: only a Mesh of an STL or OBJ file is seen"
-    assert [line for line in lines[0] if "no sensor" in line] == [f"1 CadShape {seen}", f"2 Mesh {seen}"]
+    counted = [f"1 CadShape {seen}", f"2 Mesh {seen}", "1 Text that no sensor sees: the type is unknown"]
+    assert [line for line in lines[0] if "no sensor" in line] == counted
     assert [line for line in lines[1] if "no sensor" in line] == []
 
 

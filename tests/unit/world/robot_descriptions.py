@@ -45,6 +45,8 @@ PARTS = (
     *INFRARED,
 )
 
+GEOMETRIES = ("Rectangle", "TexturedBox")
+
 _FILE = re.compile(r"PROTO (?P<name>\S+) \[\n(?P<fields>.*?)\n\]\n\{\n(?P<body>.*)\}\n\Z", re.DOTALL)
 _FIELD = re.compile(
     r"field\s+\w+(?:\{[^}]*\})?\s+(?P<name>\w+)\s+(?P<default>[^\n]*?)(?:\s{2}#[^\n]*)?$", re.MULTILINE

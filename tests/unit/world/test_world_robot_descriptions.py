@@ -13,6 +13,7 @@ from palaestra_sim.world.tree import walk
 from tests.unit.world.robot_descriptions import (
     ARMS,
     CARS,
+    GEOMETRIES,
     PARTS,
     PROTOS,
     ROBOTS,
@@ -166,7 +167,7 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
     """The reader looks for a PROTO in the file of the same name."""
     files = sorted(path.stem for path in PROTOS.glob("*.proto"))
 
-    assert files == sorted(ROBOTS + ROVERS + CARS + ARMS + PARTS)
+    assert files == sorted(ROBOTS + ROVERS + CARS + ARMS + PARTS + GEOMETRIES)
     assert [described(name).name for name in files] == files
 
 

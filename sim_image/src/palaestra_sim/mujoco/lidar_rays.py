@@ -116,24 +116,25 @@ def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any])
         around = np.unique(hits[from_inside & ~meshes])
         if not len(around):
             for at in np.flatnonzero(from_inside):
-                distances[at] = _beyond(visible, origin, directions[at], distances[at])
+                distances[at] = _beyond(visible, origin, directions[at], distances[at], hits[at])
             return distances
         visible.model.geom_group[around] = PASSED
         passed.append(around)
 
 
-def _beyond(visible: VisualModel, origin: Any, direction: Any, distance_m: float) -> float:
-    """Return the distance to the first triangle that faces the origin, beyond a triangle seen from behind.
+def _beyond(visible: VisualModel, origin: Any, direction: Any, distance_m: float, geom: int) -> float:
+    """Return the distance to the first triangle that faces the origin, from a triangle seen from behind.
 
-    Return -1 if the ray meets no such triangle.
+    A sheet with two sides has two triangles at the same distance, of which MuJoCo returns any one. Return -1
+    if the ray meets no triangle that faces the origin.
     """
-    normal = np.empty(3)
+    normal, hit = np.empty(3), np.array([geom], np.int32)
     for _ in range(_MOST_TRIANGLES):
+        if visible.faces(int(hit[0]), origin + (distance_m - _PAST_M) * direction, direction, 2.0 * _PAST_M):
+            return distance_m
         distance_m += _PAST_M
         start = origin + distance_m * direction
-        further = mujoco.mj_ray(
-            visible.model, visible.data, start, direction, _GROUPS, True, -1, None, normal
-        )
+        further = mujoco.mj_ray(visible.model, visible.data, start, direction, _GROUPS, True, -1, hit, normal)
         if further < 0.0:
             break
         distance_m += further

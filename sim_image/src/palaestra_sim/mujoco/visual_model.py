@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.scene.geometry import Vector, to_quaternion
+from palaestra_sim.scene.geometry import Vector, to_quaternion, triple
 from palaestra_sim.scene.meshes import Mesh
+from palaestra_sim.scene.visual_rays import Surface, surface_of
 from palaestra_sim.scene.visuals import Drawn
 
 _GEOMS: Final = {
@@ -42,6 +43,7 @@ class VisualModel:
         planes: the ids of the geoms that are Planes.
         sun: the direction in which the sun's light travels, as a unit vector.
         scene, option, camera: the objects of MuJoCo's visualizer.
+        surfaces: the surfaces of meshes that `faces` has looked at, by the numbers of their geoms.
     """
 
     things: tuple[Drawn, ...]
@@ -54,6 +56,15 @@ class VisualModel:
     scene: Any
     option: Any
     camera: Any
+    surfaces: dict[int, Surface] = field(default_factory=dict)
+
+    def faces(self, geom: int, start: Any, direction: Any, within_m: float) -> bool:
+        """Return whether a ray meets a mesh from the front within some meters of its start."""
+        if geom not in self.surfaces:
+            self.surfaces[geom] = surface_of(self.things[geom])
+        inward = self.things[geom].pose.inverse
+        origin, way = inward.carry(triple(start.tolist())), inward.turned(triple(direction.tolist()))
+        return self.surfaces[geom](origin, way) <= within_m
 
 
 def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:

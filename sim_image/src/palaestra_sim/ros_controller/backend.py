@@ -114,7 +114,7 @@ class Backend(Protocol):
 
     @property
     def unread_meshes(self) -> Mapping[str, int]:
-        """The number of visible shapes by type that no sensor sees, because their files are not read."""
+        """The number of visible shapes by type that no sensor sees; see `View.unread_meshes`."""
         ...
 
     @property

@@ -126,7 +126,7 @@ class Simulation:
 
     @property
     def unread_meshes(self) -> Mapping[str, int]:
-        """The number of visible shapes by type that no sensor sees, because their files are not read."""
+        """The number of visible shapes by type that no sensor sees; see `View.unread_meshes`."""
         return self._view.unread_meshes()
 
     @property

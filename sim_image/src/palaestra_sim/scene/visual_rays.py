@@ -101,7 +101,7 @@ class _Target:
         self._paint: Paint | None = None
         if textures is not None and thing.look is not None:
             self._paint = textures.paint(thing.look, thing.geometry, thing.color[3], thing.tiles)
-        self.hit = _surface(thing)
+        self.hit = surface_of(thing)
         self.radius_m = _radius(thing)
         self.reflection = reflection(thing)
         self.place()
@@ -109,8 +109,7 @@ class _Target:
     def place(self) -> None:
         """Update the pose to the current pose of the shape."""
         thing = self._thing
-        frame = Pose() if thing.place is None else thing.place.world_pose
-        pose = frame.after(thing.local)
+        pose = thing.pose
         self.inward = pose.inverse
         self.center = pose.position
         up = pose.rotation[6:]
@@ -180,7 +179,7 @@ def _radius(thing: Drawn) -> float:
 Surface = Callable[[Vector, Vector], float]
 
 
-def _surface(thing: Drawn) -> Surface:
+def surface_of(thing: Drawn) -> Surface:
     """Return a function from origin and direction, in the shape's frame, to the distance in meters."""
     half = thing.size[0] / 2.0, thing.size[1] / 2.0, thing.size[2] / 2.0
     if thing.mesh is not None:

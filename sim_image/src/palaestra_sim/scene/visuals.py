@@ -21,6 +21,7 @@ from palaestra_sim.scene.lights import lights_in
 from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.textures import Textures, texture_of
 
@@ -101,6 +102,11 @@ class Drawn:
     textured: bool = False
     tiles: tuple[float, float] = (1.0, 1.0)
 
+    @property
+    def pose(self) -> Pose:
+        """The current pose of the shape in the world."""
+        return self.local if self.place is None else self.place.world_pose.after(self.local)
+
 
 def drawn(root: SceneNode, files: MeshFiles | None = None) -> Iterator[Drawn]:
     """Yield the visible shapes of a node and of all nodes inside it, with their current fields and frames.
@@ -162,10 +168,14 @@ class View:
         return sum(it.look is None or paint(it.look, it.geometry, 1.0) is None for it in textured)
 
     def unread_meshes(self) -> Mapping[str, int]:
-        """Return the number of shapes, by type, that no sensor sees, because their files are not read."""
+        """Return the number of shapes, by type, that no sensor sees.
+
+        The file of such a shape is not read, or its type is a PROTO whose file the project does not have.
+        """
         nodes = list(self.root.descendants())
         hidden = {inside for node in nodes for inside in node.outlining()}
-        named = (node for node in nodes if node.type_name in _OF_FILES and node not in hidden)
+        unknown = {it for node in nodes for it in node.nodes("geometry") if not is_base_type(it.type_name)}
+        named = (it for it in nodes if it not in hidden and (it.type_name in _OF_FILES or it in unknown))
         return Counter(it.type_name for it in named if it.type_name != "Mesh" or not self._reads(it))
 
     def _reads(self, node: SceneNode) -> bool:

@@ -24,6 +24,7 @@ _ROLLS_AND_TURNS: Final = 2
 _MOST_NAMES: Final = 8  # maximum number of device names in one line
 _HULLS: Final = frozenset(("IndexedFaceSet", "Mesh"))
 _SIGHT: Final = frozenset(("Camera", "Lidar", "RangeFinder"))  # these devices see visible shapes
+_SEEN_MESHES: Final = "only a Mesh of an STL or OBJ file is seen"
 _OF_BODIES: Final = frozenset(("Accelerometer", "Gyro"))
 
 
@@ -44,7 +45,7 @@ class Described(Protocol):
 
     @property
     def unread_meshes(self) -> Mapping[str, int]:
-        """The number of visible shapes by type that no sensor sees, because their files are not read."""
+        """The number of visible shapes by type that no sensor sees; see `View.unread_meshes`."""
         ...
 
     @property
@@ -125,7 +126,8 @@ def differences(simulation: Described) -> Iterator[str]:
             yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if infrared or any(kind.node in _SIGHT for kind, _ in devices):
         for type_name, count in sorted(simulation.unread_meshes.items()):
-            yield f"{count} {type_name} that no sensor sees: only a Mesh of an STL or OBJ file is seen"
+            why = _SEEN_MESHES if is_base_type(type_name) else "the type is unknown"
+            yield f"{count} {type_name} that no sensor sees: {why}"
     if lidars:
         yield f"{lidars} Lidar: rays pass through the robot itself"
     for type_name, count in sorted(Counter(it.type_name for robot in robots for it in robot.passing).items()):
