@@ -13,7 +13,7 @@ from palaestra_protocol.pod.status import EvaluationStatus
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.job.run_directory import drop_lines, read_lines
 from palaestra_trainer.run import checkpoint
-from palaestra_trainer.run.best_model import best_of
+from palaestra_trainer.run.best_record import best_of
 from tests.unit.trainer.run.test_run_resume import signal_after
 
 EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # the seeds of every evaluation of these runs

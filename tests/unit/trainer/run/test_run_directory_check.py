@@ -65,14 +65,17 @@ def another_kind(name):
     return damage
 
 
-def with_member(run):
-    """Put a wrong evaluation into model.zip."""
-    members = {}
-    with zipfile.ZipFile(run.model) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(run.model, "w") as archive:
-        for name, content in (members | {"evaluation.json": b'{"step": "x"}'}).items():
-            archive.writestr(name, content)
+def with_member(wrong):
+    """Return a function that puts a member without the fields of an evaluation into model.zip."""
+
+    def damage(run):
+        with zipfile.ZipFile(run.model) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        with zipfile.ZipFile(run.model, "w") as archive:
+            for name, content in (members | {wrong: b'{"step": "x"}'}).items():
+                archive.writestr(name, content)
+
+    return damage
 
 
 def in_each_checkpoint(name, content):
@@ -110,7 +113,8 @@ DAMAGES = (
     | {
         "model.zip: empty": ("model.zip", written("model.zip", b"")),
         "model.zip: cut short": ("model.zip", halved("model.zip")),
-        "model.zip: its evaluation": ("model.zip", with_member),
+        "model.zip: its evaluation": ("model.zip", with_member("evaluation.json")),
+        "model.zip: its record": ("model.zip", with_member("evaluation-record.json")),
         "summary.json: a rate of 2": (
             "summary.json",
             written("summary.json", b'{"target": 9, "steps": 9, "success_rate": 2.0}'),

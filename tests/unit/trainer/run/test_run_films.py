@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from io import BytesIO
 from itertools import count
 
@@ -14,6 +15,8 @@ from palaestra_trainer.job.run_directory import read_lines
 from palaestra_trainer.reporting.film import MOST_BYTES
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.sight import Sight
+from palaestra_trainer.run import best_model
+from palaestra_trainer.run.best_record import best_of
 
 EVALUATION = {"everySteps": 40, "episodes": 4, "confirmEpisodes": 4}
 
@@ -80,6 +83,52 @@ class TestRobotsOnAFloor:
             assert from_bytes(film) == "image/gif"
             assert len(film) < MOST_BYTES
             assert Image.open(BytesIO(film)).n_frames > 1
+
+    @pytest.fixture
+    def killed_while_recording(self, monkeypatch):
+        """Return a function that lets a run end when it saves the episodes of its n-th best policy."""
+        keep = best_model.keep_replays
+
+        def kill(number):
+            calls = count(1)
+
+            def kept(*arguments):
+                if next(calls) == number:
+                    raise ZeroDivisionError("as good as a kill")
+                return keep(*arguments)
+
+            monkeypatch.setattr(best_model, "keep_replays", kept)
+
+        return kill
+
+    def test_episodes_of_an_earlier_policy_are_removed_before_model_zip_changes(
+        self, play, job, directory, killed_while_recording
+    ):
+        """A kill may come between the two files. Then no episodes are better than those of another policy."""
+        killed_while_recording(2)
+        steps = []
+
+        play(
+            job(evaluation=EVALUATION),
+            on_step=lambda: steps.append(1),
+            report=lambda *_: {"is_success": len(steps) > 45},
+        )
+
+        assert best_of(directory).step == 80
+        assert not directory.replays.exists()
+
+    def test_a_resumed_run_saves_the_episodes_of_the_policy_that_it_evaluates_again(
+        self, play, job, directory, killed_while_recording
+    ):
+        """The policy is not better than itself, but its episodes were not saved before the kill."""
+        once = job(evaluation={"everySteps": 80, "episodes": 4, "confirmEpisodes": 0})
+        killed_while_recording(1)
+        play(once, report=lambda *_: {"is_success": True}, step_reward=0.0)
+
+        play(once, report=lambda *_: {"is_success": True}, step_reward=0.0)
+
+        step = best_of(directory).step
+        assert json.loads(directory.replays.read_text())["of"] == f"the evaluation at step {step}"
 
 
 def test_a_run_without_recordings_shows_no_film(play, job, directory):

@@ -14,7 +14,7 @@ from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
-from palaestra_trainer.run.summary import measured
+from palaestra_trainer.run.best_record import measured
 from palaestra_trainer.run.versions import SIMULATING
 
 MOST_BYTES: Final = 2**20

@@ -8,7 +8,7 @@ from palaestra_trainer.environments.data_sheet import environment_sheet
 from palaestra_trainer.exporting.policy_module import Normalizer, PolicyModule
 from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.job.run_directory import RunDirectory
-from palaestra_trainer.run.summary import measured
+from palaestra_trainer.run.best_record import measured
 
 KEY = "palaestra"  # the key of the data sheet in a file's metadata
 

@@ -31,7 +31,8 @@ from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError,
 from palaestra_trainer.job.configuration import Configuration, dump
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import checkpoint
-from palaestra_trainer.run.best_model import Enough, forget_after, last_evaluation
+from palaestra_trainer.run.best_model import Enough
+from palaestra_trainer.run.best_record import forget_after, last_evaluation
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
 from palaestra_trainer.run.checkpoint import SavedCheckpoint
@@ -329,7 +330,7 @@ class Attempt:
     def _begin(self, found: SavedCheckpoint | None) -> None:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
-        replace_file(self._directory.configuration, lambda path: _write_text(path, text))
+        replace_file(self._directory.configuration, lambda path: path.write_text(text, encoding="utf-8"))
         self._directory.end.unlink(missing_ok=True)
         self._directory.summary.unlink(missing_ok=True)  # exists if a finished run gets more steps
         algorithms.keep(self._algorithm, self._directory)
@@ -394,7 +395,3 @@ def use_threads(environment: Mapping[str, str] = os.environ) -> None:
     """
     threads = environment.get("OMP_NUM_THREADS", "1")
     torch.set_num_threads(int(threads) if threads.isdigit() and int(threads) else 1)
-
-
-def _write_text(path: os.PathLike[str], text: str) -> None:
-    Path(path).write_text(text, encoding="utf-8")

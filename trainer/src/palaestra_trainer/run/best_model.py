@@ -8,11 +8,8 @@ played the same episodes, these episodes would select the policy too.
 
 from __future__ import annotations
 
-import json
-import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -20,7 +17,7 @@ from typing import Any
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_protocol.pod.status import Cause, EvaluationStatus
+from palaestra_protocol.pod.status import Cause
 from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer import algorithms
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult, evaluate_on_all
@@ -28,8 +25,9 @@ from palaestra_trainer.episodes.scene_film import SceneFilm
 from palaestra_trainer.episodes.second_play import record_again
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.job.run_directory import RunDirectory, append_line, drop_lines, read_lines
+from palaestra_trainer.job.run_directory import append_line, read_lines
 from palaestra_trainer.run import checkpoint
+from palaestra_trainer.run.best_record import POLICY, Best, best_of, confirmation_of, status_of
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.logger import CurvesLogger
 from palaestra_trainer.run.replays import films_of, keep_replays
@@ -38,31 +36,9 @@ from palaestra_trainer.simulators.fleet import resting, running
 
 log = structlog.get_logger(__name__)
 
-BEST = "evaluation.json"  # a member of model.zip
-
 
 class Enough(TrainerError):
     """The policy has reached the wanted success rate, so the run is complete."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Best:
-    """The evaluation of the policy in model.zip.
-
-    Attributes:
-        step: number of valid environment steps from which the policy had learned.
-        success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
-        mean_return: mean return of the evaluation's episodes.
-    """
-
-    step: int
-    success_rate: float | None
-    mean_return: float
-
-    @property
-    def score(self) -> tuple[float, float]:
-        """The rank as in `EvaluationResult.score`; the best evaluation has the highest rank."""
-        return (self.success_rate or 0.0, self.mean_return)
 
 
 class Selection:
@@ -97,16 +73,18 @@ class Selection:
             ConfigurationError: the run has a goal, but the environment does not report success.
             Interrupted: a signal has arrived.
         """
-        wanted = self._run.configuration.evaluation
+        wanted, policy = self._run.configuration.evaluation, checkpoint.digest_of_policy(self._model)
         evaluation = self._measure(EVALUATE, wanted.episodes)
         self._log("eval", step, evaluation)
-        goal = wanted.stop_at_success_rate
-        reached = goal is not None and self._confirmed(evaluation, goal, step)
-        if reached or self._best is None or evaluation.score > self._best.score:
-            self._keep(evaluation, step)
+        goal, best = wanted.stop_at_success_rate, self._best
+        reached = goal is not None and self._confirmed(evaluation, goal, step, policy)
+        # An attempt that ended before the line was written may have saved this policy, but not its replays.
+        repeated = best is not None and (best.step, best.policy) == (step, policy)
+        if reached or repeated or best is None or evaluation.score > best.score:
+            self._keep(evaluation, step, policy)
         line = {"step": step} | evaluation.record()
         append_line(self._directory.evaluations, line)
-        self._run.progress.last_evaluation = _status_of(line)
+        self._run.progress.last_evaluation = status_of(line)
         if reached:
             raise Enough(f"{_in_words(self._run.progress)} at step {step}")
 
@@ -125,16 +103,17 @@ class Selection:
         Raises:
             Interrupted: a signal has arrived.
         """
-        if not self._directory.model.exists():
-            replace_file(self._directory.model, lambda path: checkpoint.save_tensors(path, self._model))
         best = self._best
-        if best is None or not self.measures or not self._run.configuration.evaluation.confirming:
+        if best is None:  # model.zip may exist, if the run was shorter before
+            replace_file(self._directory.model, lambda path: checkpoint.save_tensors(path, self._model))
             return
-        if confirmation_of(self._directory, best.step) is None:
-            with self._acting_as_best(best, step):
-                self._keep_replays(self._confirm(best.step, step), step)
+        if not self.measures or not self._run.configuration.evaluation.confirming:
+            return
+        if confirmation_of(self._directory, best) is None:
+            with self._acting_as_best():
+                self._keep_replays(self._confirm(best.step, step, best.policy), step)
 
-    def _confirmed(self, evaluation: EvaluationResult, goal: float, step: int) -> bool:
+    def _confirmed(self, evaluation: EvaluationResult, goal: float, step: int, policy: str) -> bool:
         if evaluation.success_rate is None:
             raise ConfigurationError(
                 "evaluation.stopAtSuccessRate: the environment reports no success; set is_success in the "
@@ -144,16 +123,20 @@ class Selection:
             return False
         if not self._run.configuration.evaluation.confirming:
             return True
-        confirmation = self._confirm(step, step)
+        confirmation = self._confirm(step, step, policy)
         return confirmation.success_rate is not None and confirmation.success_rate >= goal
 
-    def _confirm(self, step: int, now: int) -> EvaluationResult:
-        """Confirm the policy of `step`, which the model now has, on the next episodes of the stream."""
+    def _confirm(self, step: int, now: int, policy: str | None) -> EvaluationResult:
+        """Confirm the policy of `step`, which the model now has, on the next episodes of the stream.
+
+        The line has the digest `policy`; None: the line has no digest, as model.zip of an older release.
+        """
         before = sum(int(line["episodes"]) for line in read_lines(self._directory.confirmations))
         evaluation = self._measure(CONFIRM, self._run.configuration.evaluation.confirming, before)
         self._log("confirm", now, evaluation, of_step=step)
         self._confirmation = (step, evaluation)
-        line = {"step": step, "confirmed_at": now} | evaluation.record()
+        known = {} if policy is None else {POLICY: policy}
+        line = {"step": step, "confirmed_at": now} | known | evaluation.record()
         append_line(self._directory.confirmations, line)
         return evaluation
 
@@ -194,15 +177,20 @@ class Selection:
         bounds = {} if interval is None else {"success_low": interval.low, "success_high": interval.high}
         log.info(event, step=step, **fields, **evaluation.summary(), **bounds)
 
-    def _keep(self, evaluation: EvaluationResult, step: int) -> None:
-        rate, mean_return = evaluation.success_rate, evaluation.mean_return
-        self._best = best = Best(step=step, success_rate=rate, mean_return=mean_return)
+    def _keep(self, evaluation: EvaluationResult, step: int, policy: str) -> None:
+        self._best = best = Best(
+            step=step,
+            success_rate=evaluation.success_rate,
+            mean_return=evaluation.mean_return,
+            record={"step": step, POLICY: policy} | evaluation.record(),
+        )
 
         def write(path: Path) -> None:
             checkpoint.save_tensors(path, self._model)
-            with zipfile.ZipFile(path, "a") as archive:
-                archive.writestr(BEST, json.dumps(asdict(best)))
+            best.add_to(path)
 
+        # If the attempt is killed here, missing replays are better than those of another policy.
+        self._directory.replays.unlink(missing_ok=True)
         replace_file(self._directory.model, write)
         self._keep_replays(evaluation, step)
 
@@ -223,11 +211,8 @@ class Selection:
             logger.show({f"episodes/{title}": film for title, film in films_of(kept).items()}, now)
 
     @contextmanager
-    def _acting_as_best(self, best: Best, step: int) -> Iterator[None]:
+    def _acting_as_best(self) -> Iterator[None]:
         """Load the policy of model.zip into the model for the context; restore the model afterwards."""
-        if best.step == step:
-            yield
-            return
         own, normalizer = checkpoint.Tensors.of(self._model), algorithms.normalizer_of(self._model)
         normalized = None if normalizer is None else normalizer.to_json()
         try:
@@ -237,50 +222,6 @@ class Selection:
             own.put_back(self._model)
             if normalizer is not None and normalized is not None:
                 normalizer.learn_from_json(normalized)
-
-
-def best_of(directory: RunDirectory) -> Best | None:
-    """Return the evaluation of model.zip; None if model.zip is missing or was not evaluated."""
-    if not directory.model.exists():
-        return None
-    with zipfile.ZipFile(directory.model) as archive:
-        return Best(**json.loads(archive.read(BEST))) if BEST in archive.namelist() else None
-
-
-def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None:
-    """Return the confirmation of the policy of `step`; None if that policy was not confirmed."""
-    found = (line for line in read_lines(directory.confirmations) if line["step"] == step)
-    return next(found, None)
-
-
-def last_evaluation(directory: RunDirectory, step: int) -> EvaluationStatus | None:
-    """Return the last evaluation up to `step`; None if the run has no such evaluation."""
-    lines = (line for line in read_lines(directory.evaluations) if line["step"] <= step)
-    newest = max(lines, key=lambda line: int(line["step"]), default=None)
-    return None if newest is None else _status_of(newest)
-
-
-def last_evaluated(directory: RunDirectory, step: int) -> int:
-    """Return the step of the last evaluation up to `step`; 0 if there is no evaluation.
-
-    The file evaluations.jsonl does not contain an interrupted evaluation, so a resumed attempt repeats it.
-    """
-    evaluation = last_evaluation(directory, step)
-    return 0 if evaluation is None else evaluation.step
-
-
-def forget_after(directory: RunDirectory, step: int) -> None:
-    """Drop evaluations after the resumed `step`, and confirmations whose evaluation is not recorded."""
-    drop_lines(directory.evaluations, lambda line: line["step"] > step)
-    evaluated = last_evaluated(directory, step)
-    drop_lines(directory.confirmations, lambda line: line["confirmed_at"] > evaluated)
-
-
-def _status_of(line: Mapping[str, Any]) -> EvaluationStatus:
-    """Return a line of evaluations.jsonl as it is reported."""
-    return EvaluationStatus(
-        step=line["step"], success_rate=line["success_rate"], mean_return=line["mean_return"]
-    )
 
 
 def _in_words(progress: Progress) -> str:

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.run_directory import RunDirectory
-from palaestra_trainer.run.best_model import BEST
+from palaestra_trainer.run.best_record import BEST, RECORD
 
 REMEDY = "restore it from a copy, or move the run directory away to start a new run"
 _DATA = "data"
@@ -41,6 +41,7 @@ class _Evaluation(_Content):
 class _Confirmation(_Evaluation):
     confirmed_at: _Count
     episodes: _Count
+    policy: str | None = None
 
 
 class _Attempt(_Content):
@@ -51,6 +52,12 @@ class _Interval(_Content):
     low: Annotated[float, Field(ge=0.0, le=1.0)]
     high: Annotated[float, Field(ge=0.0, le=1.0)]
     episodes: Annotated[int, Field(ge=1)]
+
+
+class _Record(_Evaluation):
+    policy: str
+    episodes: _Count
+    success_interval: _Interval | None
 
 
 class _Summary(_Content):
@@ -130,8 +137,9 @@ def _check_model(path: Path) -> None:
         # A truncated file may end with the index of a zip inside it, and then looks complete.
         if _DATA not in archive.namelist():
             raise _Damaged(f"has no {_DATA}, as models of Stable-Baselines3 have")
-        if BEST in archive.namelist():
-            _check(json.loads(archive.read(BEST)), _Evaluation, f"{BEST} in it: ")
+        for name, kind in {BEST: _Evaluation, RECORD: _Record}.items():
+            if name in archive.namelist():
+                _check(json.loads(archive.read(name)), kind, f"{name} in it: ")
 
 
 def _check(content: Any, kind: Any, where: str = "") -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from palaestra_protocol.pod.status import SuccessInterval, Termination
 from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
-from palaestra_trainer.run.best_model import best_of, confirmation_of, last_evaluation
+from palaestra_trainer.run.best_record import last_evaluation, measured
 from palaestra_trainer.run.telemetry.goodput import trained_share
 from palaestra_trainer.run.telemetry.progress import Progress
 
@@ -82,17 +81,6 @@ def last_word_of(summary: dict[str, Any], directory: RunDirectory) -> Terminatio
         success_interval=None if interval is None else SuccessInterval.from_json(interval),
         last_evaluation=last_evaluation(directory, summary["steps"]),
     )
-
-
-def measured(directory: RunDirectory) -> dict[str, Any]:
-    """Return the most reliable evaluation of model.zip; empty if model.zip was never evaluated."""
-    best = best_of(directory)
-    if best is None:
-        return {}
-    if confirmation := confirmation_of(directory, best.step):
-        return confirmation
-    evaluated = (line for line in read_lines(directory.evaluations) if line["step"] == best.step)
-    return next(evaluated, asdict(best))
 
 
 def _rounded(share: float | None) -> float | None:

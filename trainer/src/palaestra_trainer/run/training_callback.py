@@ -20,7 +20,8 @@ from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.episodes.collecting import CollectingVecEnv
 from palaestra_trainer.run import checkpoint
-from palaestra_trainer.run.best_model import Selection, last_evaluated
+from palaestra_trainer.run.best_model import Selection
+from palaestra_trainer.run.best_record import last_evaluated
 from palaestra_trainer.run.checkpoint import SavedCheckpoint, Tensors, TrainingState
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.journal import Journal

@@ -12,7 +12,12 @@ from palaestra_trainer.run.checkpoint.initial_policy import begin_from
 from palaestra_trainer.run.checkpoint.manifest import Manifest, SavedCheckpoint, describe, refuse_another_run
 from palaestra_trainer.run.checkpoint.state import TrainingState
 from palaestra_trainer.run.checkpoint.store import Saver, newest, restore, tidy
-from palaestra_trainer.run.checkpoint.tensors import Tensors, load_tensors, save_tensors
+from palaestra_trainer.run.checkpoint.tensors import (
+    Tensors,
+    digest_of_policy,
+    load_tensors,
+    save_tensors,
+)
 
 __all__ = [
     "Manifest",
@@ -22,6 +27,7 @@ __all__ = [
     "TrainingState",
     "begin_from",
     "describe",
+    "digest_of_policy",
     "load_tensors",
     "newest",
     "refuse_another_run",

@@ -6,6 +6,7 @@ the policy needs no other file. Stable-Baselines3 ignores this member when it re
 
 from __future__ import annotations
 
+import hashlib
 import json
 import zipfile
 from collections.abc import Mapping
@@ -77,6 +78,22 @@ def load_tensors(path: Path, model: BaseAlgorithm) -> None:
             "use the configuration it was trained with"
         ) from error
     _set_variables(model, variables or {})
+
+
+def digest_of_policy(model: BaseAlgorithm) -> str:
+    """Return the sha256 of a policy's tensors, as text, including the statistics of its normalization.
+
+    A policy that was saved and loaded, or resumed from a checkpoint, has the digest that it had before.
+    """
+    digest = hashlib.sha256()
+    for name, value in sorted(model.policy.state_dict().items()):
+        if isinstance(value, torch.Tensor):
+            content = value.detach().cpu()
+            digest.update(f"{name} {content.dtype} {tuple(content.shape)}\n".encode())
+            digest.update(content.reshape(-1).view(torch.uint8).numpy().tobytes())
+    if normalizer := normalizer_of(model):
+        digest.update(json.dumps(normalizer.to_json(), sort_keys=True).encode())
+    return digest.hexdigest()
 
 
 def _set_variables(model: BaseAlgorithm, variables: Mapping[str, torch.Tensor | None]) -> None:
