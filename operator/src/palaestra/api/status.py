@@ -228,8 +228,8 @@ class ReplicaStatus(StatusModel):
     """Environment steps at which training ends; absent: not known yet."""
 
     success_rate: Fraction | None = None
-    """Share of successful episodes in the last evaluation or confirmation, 0 to 1. Absent: no evaluation yet,
-    or the environment reports no success."""
+    """Share of successful episodes in the last evaluation or confirmation, 0 to 1; after the training, of the
+    best policy. Absent: no evaluation yet, or the environment reports no success."""
 
     success_interval: SuccessInterval | None = None
     """Interval (Wilson, 95 %) for the true success rate of the policy; absent: `successRate` is absent."""

@@ -204,8 +204,8 @@ class Termination(JsonMessage):
     Attributes:
         step: number of valid environment steps that the algorithm learned from.
         reason: the reason for which the trainer ended, in a sentence.
-        success_rate: the success rate of the last evaluation or confirmation, 0 to 1; None without an
-            evaluation, or if the environment does not report success.
+        success_rate: the success rate of the last evaluation or confirmation, 0 to 1; if the run is complete,
+            of the best policy; None without an evaluation, or if the environment does not report success.
         success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
         last_checkpoint: the newest checkpoint; None if there is no checkpoint.
         attempt: number of this attempt, counted from 1 in the run directory's record; None if not recorded.

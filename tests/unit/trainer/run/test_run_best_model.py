@@ -6,6 +6,7 @@ import json
 import os
 import signal
 
+import pytest
 from stable_baselines3.common.save_util import load_from_zip_file
 from torch import equal
 
@@ -200,3 +201,38 @@ def test_an_evaluation_that_was_cut_is_not_the_last_one(play, job, last_word):
 
     assert last_word().success_rate == 1.0
     assert last_word().last_evaluation is None
+
+
+@pytest.mark.parametrize(("confirming", "rate"), [(0, 1.0), (4, 0.5)], ids=["evaluated", "confirmed"])
+def test_the_last_word_of_a_complete_run_has_the_success_rate_of_its_best_policy(
+    play, job, directory, last_word, confirming, rate
+):
+    """The best policy was measured at step 40, and the evaluations of later policies are worse."""
+    steps = []
+    good = {*EVALUATED, *episode_seeds(1, CONFIRM, 2)}
+    goal = 0.9 if confirming else None  # an evaluation that reaches the goal is confirmed at once
+
+    play(
+        job(evaluation=GOAL | {"stopAtSuccessRate": goal, "confirmEpisodes": confirming}),
+        on_step=lambda: steps.append(1),
+        report=lambda seed, _: {"is_success": len(steps) <= 40 and seed in good},
+    )
+
+    result = summary(directory)
+    assert [line["success_rate"] for line in read_lines(directory.evaluations)] == [1.0, 0.0, 0.0]
+    assert (result["best_step"], result["success_rate"]) == (40, rate)
+    assert last_word().success_rate == rate
+    assert last_word().success_interval.to_json() == result["success_interval"]
+
+
+def test_a_run_whose_best_policy_was_confirmed_before_a_kill_ends_with_its_success_rate(
+    play, job, directory, last_word
+):
+    """The resumed attempt evaluates nothing, and the operator reads only the last word."""
+    play(job(), report=lambda *_: {"is_success": True})
+    directory.summary.unlink()  # as after a kill before the summary
+
+    play(job(), report=lambda *_: {"is_success": False})
+
+    assert len([*read_lines(directory.confirmations)]) == 1
+    assert last_word().success_rate == summary(directory)["success_rate"] == 1.0

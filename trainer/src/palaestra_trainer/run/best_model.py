@@ -27,7 +27,14 @@ from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.job.run_directory import append_line, read_lines
 from palaestra_trainer.run import checkpoint
-from palaestra_trainer.run.best_record import POLICY, Best, best_of, confirmation_of, status_of
+from palaestra_trainer.run.best_record import (
+    POLICY,
+    Best,
+    best_of,
+    confirmation_of,
+    measured,
+    status_of,
+)
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.logger import CurvesLogger
 from palaestra_trainer.run.replays import films_of, keep_replays
@@ -100,18 +107,20 @@ class Selection:
     def finish(self, step: int) -> None:
         """Confirm the best policy at the end of training; without evaluations, save the last policy instead.
 
+        Afterwards the run reports the success rate of the best policy, even if the last evaluation is one of
+        another policy.
+
         Raises:
             Interrupted: a signal has arrived.
         """
-        best = self._best
+        best, confirming = self._best, self._run.configuration.evaluation.confirming
         if best is None:  # model.zip may exist, if the run was shorter before
             replace_file(self._directory.model, lambda path: checkpoint.save_tensors(path, self._model))
             return
-        if not self.measures or not self._run.configuration.evaluation.confirming:
-            return
-        if confirmation_of(self._directory, best) is None:
+        if self.measures and confirming and confirmation_of(self._directory, best) is None:
             with self._acting_as_best():
                 self._keep_replays(self._confirm(best.step, step, best.policy), step)
+        self._run.progress.completed(measured(self._directory))
 
     def _confirmed(self, evaluation: EvaluationResult, goal: float, step: int, policy: str) -> bool:
         if evaluation.success_rate is None:

@@ -32,10 +32,17 @@ class _Content(BaseModel):
     model_config = ConfigDict(strict=True, extra="ignore")
 
 
+class _Interval(_Content):
+    low: Annotated[float, Field(ge=0.0, le=1.0)]
+    high: Annotated[float, Field(ge=0.0, le=1.0)]
+    episodes: Annotated[int, Field(ge=1)]
+
+
 class _Evaluation(_Content):
     step: _Count
     success_rate: _Rate
     mean_return: float
+    success_interval: _Interval | None = None
 
 
 class _Confirmation(_Evaluation):
@@ -44,20 +51,13 @@ class _Confirmation(_Evaluation):
     policy: str | None = None
 
 
-class _Attempt(_Content):
-    reason: str
-
-
-class _Interval(_Content):
-    low: Annotated[float, Field(ge=0.0, le=1.0)]
-    high: Annotated[float, Field(ge=0.0, le=1.0)]
-    episodes: Annotated[int, Field(ge=1)]
-
-
 class _Record(_Evaluation):
     policy: str
     episodes: _Count
-    success_interval: _Interval | None
+
+
+class _Attempt(_Content):
+    reason: str
 
 
 class _Summary(_Content):

@@ -102,8 +102,8 @@ class Progress:
         step: number of valid environment steps so far, over all attempts.
         target: number of steps at which the run ends.
         counters: counts over all attempts, without the time of this attempt; `counted` adds that time.
-        success_rate: success rate of this attempt's last evaluation or confirmation; None before the first
-            evaluation, or if the environment does not report success.
+        success_rate: success rate of this attempt's last evaluation or confirmation, after `completed` of the
+            best policy; None before an evaluation, or if the environment does not report success.
         success_interval: the interval around `success_rate`; None if the rate is None.
         last_evaluation: the newest evaluation, over all attempts; None before the first evaluation.
         checkpoint: the newest checkpoint; None before the first checkpoint.
@@ -274,6 +274,13 @@ class Progress:
             self.success_rate = evaluation.success_rate
             self.success_interval = evaluation.success_interval
         self.figures.evaluated(evaluation)
+
+    def completed(self, best: Mapping[str, Any]) -> None:
+        """Set the success rate to that of the best policy, from the record of its evaluation."""
+        interval = best.get("success_interval")
+        with self._lock:
+            self.success_rate = best.get("success_rate")
+            self.success_interval = None if interval is None else SuccessInterval.from_json(interval)
 
     def saved(self, step: int) -> None:
         """Record that a checkpoint was written."""
