@@ -1,12 +1,13 @@
 """A run with asynchronous collection trains, evaluates, saves and resumes like any other."""
 
 import itertools
+import math
 import os
 import signal
 
 import pytest
 
-from palaestra_trainer.run import checkpoint
+from palaestra_trainer.run import checkpoint, training_callback
 from palaestra_trainer.waiting.greenlets import let_others
 
 
@@ -43,6 +44,17 @@ def test_an_interrupted_run_continues_from_its_checkpoint(play, asked, last_word
     assert 0 < before < 100
     assert resumed == 0
     assert 100 <= last_word().step < 100 + 3, "one step has a row of each simulator at most"
+
+
+def test_simulators_pause_for_a_long_update_and_not_at_every_step(play, job, monkeypatch):
+    """A pause ends all pending steps, so after each pause all simulators have waited for the slowest."""
+    monkeypatch.setattr(training_callback, "LONG_LEARNING_S", 0.0)
+    wanted = job(collection="Asynchronous", collectors=3, evaluation={"everySteps": 0})
+
+    _, members = play(wanted, on_step=let_others)
+
+    rollouts = math.ceil(100 / (4 * 3))  # DQN learns after 4 steps of each simulator
+    assert 1 < members["collect-0"].log.count("pause") <= rollouts
 
 
 def test_an_algorithm_that_learns_from_rollouts_is_refused_before_a_simulator_starts(play, job, last_word):

@@ -65,6 +65,38 @@ class ValidRowsCounted(BaseAlgorithm):
         return [*super()._excluded_save_params(), *_BUFFERS, "_begun", "_counted_at"]
 
 
+class _PartOfRollout(BaseCallback):
+    """Joins rollouts of one vector step to one rollout of another callback, which only its caller ends.
+
+    Otherwise the run would pause its simulators for an update after each vector step.
+    """
+
+    def __init__(self, callback: BaseCallback) -> None:
+        super().__init__()
+        self._callback = callback
+        self._begun = False
+
+    def on_rollout_start(self) -> None:
+        """Begin the rollout at its first vector step."""
+        if not self._begun:
+            self._begun = True
+            self._callback.on_rollout_start()
+
+    def on_step(self) -> bool:
+        """Return whether the other callback continues the training."""
+        return self._callback.on_step()
+
+    def on_rollout_end(self) -> None:
+        """Do nothing, because further vector steps may follow."""
+
+    def update_locals(self, locals_: dict[str, Any]) -> None:
+        """Pass the local variables of the collection to the other callback."""
+        self._callback.update_locals(locals_)
+
+    def _on_step(self) -> bool:
+        return True
+
+
 class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     """An off-policy algorithm that stores only valid rows, and stops at the run's number of steps.
 
@@ -98,12 +130,15 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
         """Collect `count` valid rows; a vector step of an asynchronous environment may have only one."""
         before, episodes = self.num_timesteps, 0
         wanted = min(before + count, self._total_timesteps)
+        part_of_rollout = _PartOfRollout(callback)
         goes_on = True
         while goes_on and self.num_timesteps < wanted:
             one = TrainFreq(1, TrainFrequencyUnit.STEP)
-            rollout = super().collect_rollouts(env, callback, one, *args, **kwargs)
+            rollout = super().collect_rollouts(env, part_of_rollout, one, *args, **kwargs)
             episodes += rollout.n_episodes
             goes_on = rollout.continue_training
+        if goes_on:
+            callback.on_rollout_end()
         return RolloutReturn(self.num_timesteps - before, episodes, goes_on)
 
     def _store_transition(
