@@ -1,4 +1,4 @@
-"""The boundingObjects of devices, and of parts that motors move."""
+"""The boundingObjects that collide as in Webots, and the lines about those that do not."""
 
 import pytest
 
@@ -51,3 +51,49 @@ def test_a_part_that_forces_move_collides():
     lines = list(differences(Setting("mujoco").load(nodes)))
 
     assert not [line for line in lines if "collides with nothing" in line]
+
+
+@for_each(
+    "geometry, lines",
+    [
+        ("Box { size 1 1 1 }", []),
+        ("Cylinder { radius 0.2 height 1 }", []),
+        ("Sphere { radius 0.2 }", ["1 Sphere"]),
+        ("Capsule { radius 0.2 height 1 }", ["1 Capsule"]),
+        ("Pose { rotation 1 0 0 1.5707963 children Cylinder { radius 0.2 height 1 } }", ["1 Cylinder"]),
+        ("Group { children [ Box { } Sphere { } Sphere { } ] }", ["2 Sphere"]),
+    ],
+)
+def test_an_obstacle_with_the_outline_of_its_widest_height_is_listed(geometry, lines):
+    """In the stub a low robot touches a ball at the ball's full width, so distances differ from Webots."""
+    obstacle = f"Solid {{ translation 2 0 0.5 boundingObject {geometry} }}"
+    listed, exact = (
+        [line for line in differences(Setting(physics).load(obstacle + robot(""))) if "from above" in line]
+        for physics in ("stub", "mujoco")
+    )
+
+    touched = "as boundingObject: robots touch its outline from above, at each height"
+    assert listed == [f"{line} {touched}" for line in lines]
+    assert exact == []
+
+
+@for_each(
+    "fields, lines",
+    [
+        ("boundingObject Cylinder { radius 0.2 height 1 }", []),
+        (BODY, ['robot "r": upright cylinders collide in place of 1 Box']),
+        (
+            "boundingObject Sphere { radius 0.2 }",
+            ['robot "r": upright cylinders collide in place of 1 Sphere'],
+        ),
+    ],
+)
+def test_a_robot_that_collides_as_upright_cylinders_is_listed(fields, lines):
+    """The corners of a box are round in the stub, so a robot passes corners that stop it in Webots."""
+    listed, exact = (
+        [line for line in differences(Setting(physics).load(robot("", fields))) if "upright" in line]
+        for physics in ("stub", "mujoco")
+    )
+
+    assert listed == lines
+    assert exact == []

@@ -28,12 +28,13 @@ class MujocoBody:
         base: the wheels of the robot.
         poses: the pose of each shape of the outline, in the robot's frame.
         radius_m: the radius of the circle around the outline.
-        x, y, heading_rad, c, s, velocity, touched: see `Body`.
+        rim, x, y, heading_rad, c, s, velocity, touched: see `Body`.
     """
 
     def __init__(self, build: Build) -> None:
         self.build = build
         self.base = build.base
+        self.rim = build.outline
         self.radius_m = max((_reach(shape) for shape in build.outline), default=0.1)
         # The robot is still at the origin of the world, so these poses are relative to the robot.
         self.poses = tuple(shape.pose for shape in build.outline)

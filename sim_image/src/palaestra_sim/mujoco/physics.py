@@ -42,7 +42,7 @@ class MujocoPhysics:
         feeling: whether the model has a contact sensor for each part of a robot; see `model.build`.
     """
 
-    abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
+    abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True, exact=True)
 
     def __init__(self, *, feeling: bool = False) -> None:
         self._feeling = feeling

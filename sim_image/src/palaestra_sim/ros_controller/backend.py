@@ -15,6 +15,7 @@ from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Abilities
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.fields import NodeField
 from palaestra_sim.scene.tree.scene_tree import SceneTree
@@ -108,8 +109,8 @@ class Backend(Protocol):
         ...
 
     @property
-    def forces(self) -> bool:
-        """Whether the masses and frictions of the world's nodes affect the motion."""
+    def abilities(self) -> Abilities:
+        """The contents of a world that the physics simulates."""
         ...
 
     @property

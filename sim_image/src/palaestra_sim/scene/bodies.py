@@ -53,6 +53,11 @@ class Body(Protocol):
     velocity: tuple[float, float, float]
     touched: int
 
+    @property
+    def rim(self) -> Sequence[Shape]:
+        """The shapes of the body that can touch other objects, some of them several times."""
+        ...
+
     def bits(self, outline: Sequence[Shape]) -> int:
         """Return the parts of the body that match these shapes, as bits of `touched`."""
         ...

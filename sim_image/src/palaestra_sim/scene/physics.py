@@ -57,6 +57,7 @@ class Abilities:
         leaning: whether shapes may have any rotation.
         forces: whether forces have an effect.
         joints: whether forces move parts on joints.
+        exact: whether robots and objects collide with their shapes, and not with outlines from above.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Abilities:
     leaning: bool = False
     forces: bool = False
     joints: bool = False
+    exact: bool = False
 
 
 class Push(NamedTuple):

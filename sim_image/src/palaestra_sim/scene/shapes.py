@@ -64,6 +64,11 @@ class Shape:
         """Whether the shape is round about a level axis."""
         return self.kind in {"cylinder", "capsule"} and abs(self.pose.rotation[8]) < _ACROSS
 
+    @property
+    def prismatic(self) -> bool:
+        """Whether the outline from above is the same at each height between the lower and the upper end."""
+        return self.kind == "box" or (self.kind == "cylinder" and not self.lies)
+
     def heights(self) -> tuple[float, float]:
         """Return z of the shape's lower end and of its upper end."""
         pose = self.pose

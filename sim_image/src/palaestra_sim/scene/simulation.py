@@ -26,7 +26,7 @@ from palaestra_sim.scene.node_motion import NodeMotion
 from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.observers import OutlineObservers
-from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.physics import Abilities, Physics
 from palaestra_sim.scene.radio import Radio
 from palaestra_sim.scene.reader import SceneContents, read_added, read_scene
 from palaestra_sim.scene.robot import Robot
@@ -135,9 +135,9 @@ class Simulation:
         return (*self.scene.left_out, *self.tree.ignored)
 
     @property
-    def forces(self) -> bool:
-        """Whether the masses and frictions of the world's nodes affect the motion."""
-        return self.scene.physics.abilities.forces
+    def abilities(self) -> Abilities:
+        """The contents of a world that the physics simulates."""
+        return self.scene.physics.abilities
 
     @property
     def basic_step_ms(self) -> int:

@@ -13,6 +13,8 @@ from palaestra_sim.scene.devices.distance_sensor import DistanceSensor, Distance
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import of_old_axes
+from palaestra_sim.scene.outlines import outlines_of
+from palaestra_sim.scene.physics import Abilities
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.robot_parts import RobotParts
 from palaestra_sim.scene.steering import SteeredDrive
@@ -39,8 +41,8 @@ class Described(Protocol):
         ...
 
     @property
-    def forces(self) -> bool:
-        """Whether the masses and frictions of the world's nodes affect the motion."""
+    def abilities(self) -> Abilities:
+        """The contents of a world that the physics simulates."""
         ...
 
     @property
@@ -135,6 +137,7 @@ def differences(simulation: Described) -> Iterator[str]:
     yield from _without_physics(it for it in robots if not _of_a_model(it.node))
     for type_name, count in sorted(meshes.items()):
         yield f"{count} {type_name} as boundingObject: robots touch its convex hull"
+    yield from _outlined(simulation)
     rays = (
         beam
         for _, it in devices
@@ -144,6 +147,24 @@ def differences(simulation: Described) -> Iterator[str]:
     sloped = any(not beam.level for beam in rays)
     if sloped and not any(node.type_name == "Plane" for node in outlines):
         yield "no Plane as boundingObject: rays meet a floor at height 0"
+
+
+def _outlined(simulation: Described) -> Iterator[str]:
+    """Yield a line for each type of obstacle and for each robot that collides with an outline from above."""
+    if simulation.abilities.exact:
+        return
+    nodes = simulation.tree.nodes.values()
+    apart = [node for node in nodes if "Robot" not in {it.type_name for it in (node, *node.ancestors())}]
+    shapes = outlines_of(apart, tuple, simulation.tree.mesh_files).all
+    rounded = Counter(shape.node.type_name for shape in shapes if not shape.prismatic)
+    for type_name, count in sorted(rounded.items()):
+        yield f"{count} {type_name} as boundingObject: robots touch its outline from above, at each height"
+    for robot in simulation.robots:
+        rim = {} if robot.body is None else {shape.node.number: shape for shape in robot.body.rim}
+        others = [it for it in rim.values() if it.kind != "cylinder" or it.lies]
+        if others:
+            types = _counted(Counter(shape.node.type_name for shape in others))
+            yield f'robot "{robot.name}": upright cylinders collide in place of {types}'
 
 
 def _of_a_model(node: SceneNode) -> bool:
@@ -180,7 +201,7 @@ def _without_effect(simulation: Described) -> Iterator[str]:
     by_ros = [robot.parts.node for robot in simulation.robots if robot.parts.arguments is not None]
     fields: dict[str, Counter[str]] = {}
     for node in simulation.tree.nodes.values():
-        matters = _is_on(node, by_ros) if node.type_name in DEVICES else simulation.forces
+        matters = _is_on(node, by_ros) if node.type_name in DEVICES else simulation.abilities.forces
         if matters and not node.left_out:
             fields.setdefault(node.type_name, Counter()).update(without_effect(node))
     for type_name, names in sorted(fields.items()):

@@ -74,11 +74,6 @@ def _simple(shape: Shape) -> Disc | Block:
     return Block(x, y, heading_rad, (length, width))
 
 
-def prismatic(shape: Shape) -> bool:
-    """Return whether a shape has the same outline at each height between its lower and its upper end."""
-    return shape.kind == "box" or (shape.kind == "cylinder" and not shape.lies)
-
-
 def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
     """Return the discs of a robot's outline with their shapes; a disc inside another disc is left out."""
     parts = [(part, shape) for shape in shapes for part in _discs(shape)]

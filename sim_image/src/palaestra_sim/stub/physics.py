@@ -26,7 +26,7 @@ from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
 from palaestra_sim.stub.obstacles import Neighborhood
 from palaestra_sim.stub.others import OtherRobot
-from palaestra_sim.stub.outline import covering, obstacle, prismatic
+from palaestra_sim.stub.outline import covering, obstacle
 from palaestra_sim.stub.rays import Fan, Met, Rounded, SlopedBeams, Upright
 
 _Tall = tuple[Shape, tuple[float, float]]  # a shape, and the heights of its lower and its upper end
@@ -103,8 +103,8 @@ class StubPhysics:
             if not self._sloped.get(figure):
                 continue
             around = [shape for shape in solids if not _is_on(figure, shape)]
-            uprights = [_upright(shape) for shape in around if prismatic(shape)]
-            rounded: list[Met] = [_rounded(shape) for shape in around if not prismatic(shape)]
+            uprights = [_upright(shape) for shape in around if shape.prismatic]
+            rounded: list[Met] = [_rounded(shape) for shape in around if not shape.prismatic]
             rounded += [robot for _, robot in robots]
             for sloped in self._sloped[figure]:
                 sloped.face(uprights, self._surroundings.heights_m(), rounded)
@@ -178,7 +178,7 @@ class StubPhysics:
         whole, partly = [], []
         rounded: list[Met] = [robot for _, robot in others if not robot.stands_along(low, high)]
         for shape, (bottom, top) in _between(self._tall, level.heights, height):
-            if not prismatic(shape):
+            if not shape.prismatic:
                 rounded.append(_rounded(shape))
             elif bottom < low and high < top:
                 whole.append(shape)

@@ -21,6 +21,7 @@ from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Abilities
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.fields import NodeField
 
@@ -57,7 +58,8 @@ class MjcfSimulation:
         self.time_ms = 0
         self.mode = mode
         self.quit_status: int | None = None
-        self.forces = False  # the scene's nodes contain no masses or friction; MuJoCo's model contains both
+        # The scene's nodes contain no masses or friction; MuJoCo's model contains both.
+        self.abilities = Abilities(name="MuJoCo", exact=True)
         self.unread_textures = 0  # textures affect only infra-red sensors, which MJCF does not have
         self.unread_meshes: Mapping[str, int] = {}  # MuJoCo reads all files of a model
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
