@@ -73,7 +73,7 @@ class CountingMasked(Counting, MaskedTask):
 def train(make_member, make_configuration, tmp_path):
     """Return a function that trains for some steps with an evaluation; it returns the run directory."""
 
-    def run(name, space):
+    def run(name, space, **algorithm):
         entry = ALGORITHMS[name]
         kind = "Box" if spaces.Box in (entry.actions or ()) else "Discrete"
         counting = CountingMasked if name == "MaskablePPO" else Counting
@@ -86,7 +86,8 @@ def train(make_member, make_configuration, tmp_path):
 
         hyperparameters = {"policy_kwargs": SMALL} | HYPERPARAMETERS.get(name, OFF_POLICY)
         configuration = make_configuration(
-            algorithm={"name": name, "hyperparameters": hyperparameters, "normalize": {"rewards": False}},
+            algorithm={"name": name, "hyperparameters": hyperparameters, "normalize": {"rewards": False}}
+            | algorithm,
             environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered environment
             steps=16,
             evaluation={"everySteps": 8, "episodes": 1, "confirmEpisodes": 0},
@@ -119,3 +120,18 @@ def test_they_are_trained_on_and_evaluated_and_both_files_act_as_the_policy(trai
     if name == "RecurrentPPO":
         batch |= {state: np.zeros((1, 1, 4), np.float32) for state in ("hidden", "cell")}
     assert np.allclose(session.run(["action"], batch)[0][0], policy.predict(seen, **masks)[0], atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(36, 40, 3), (3, 36, 40)])
+def test_a_file_takes_images_in_the_layout_of_the_environment(train, shape):
+    """Stable-Baselines3 transposes images with channels last, and leaves those with channels first."""
+    space = spaces.Box(0, 255, shape, np.uint8)
+    directory = train("A2C", space, normalize=None, cnn="small", hyperparameters={})
+
+    exporting.export(directory.path, "onnx")
+
+    policy = load_policy(directory.path)
+    session = onnxruntime.InferenceSession(directory.path / "policy.onnx")
+    seen = np.random.default_rng(3).integers(256, size=shape).astype(np.uint8)
+    action = session.run(["action"], {"observation": seen[None]})[0][0]
+    assert np.allclose(action, policy.predict(seen)[0], atol=1e-5)

@@ -6,8 +6,8 @@ models get images with channels first. A checkpoint stores images in the layout 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
+from typing import Any, Final
 
 import numpy as np
 from gymnasium import spaces
@@ -19,6 +19,8 @@ from palaestra_trainer.algorithms.observations import Observations
 from palaestra_trainer.algorithms.small_cnn import SmallCnn
 from palaestra_trainer.algorithms.space_compat import images_in
 from palaestra_trainer.job.configuration import Cnn
+
+_NOTE: Final = "transposed_images"
 
 
 def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:
@@ -37,6 +39,20 @@ def with_channels_first(env: VecEnv) -> VecEnv:
     """
     last = [image for image in images_in(env.observation_space) if not is_image_space_channels_first(image)]
     return VecTransposeImage(env) if last else env
+
+
+def note_transposed(model: BaseAlgorithm) -> None:
+    """Note on a model which images it gets transposed; the model's zip has the note."""
+    setattr(model, _NOTE, [key or "" for key in _transposed(model)])
+
+
+def transposed_images(model: BaseAlgorithm) -> Collection[str] | None:
+    """Return the keys of images that a model gets transposed, "" for an observation that is an image.
+
+    None: an older release saved the model, which does not note the keys.
+    """
+    noted: Collection[str] | None = getattr(model, _NOTE, None)
+    return noted
 
 
 def as_returned(model: BaseAlgorithm, observations: Observations) -> Observations:

@@ -18,7 +18,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_trainer.algorithms import buffer_options, hyperparameters, limits, noise, unknown_words
-from palaestra_trainer.algorithms.images import with_channels_first, with_network
+from palaestra_trainer.algorithms.images import note_transposed, with_channels_first, with_network
 from palaestra_trainer.algorithms.inputs import give_copies
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.registry import ARENA_ENVIRONMENTS, RegisteredAlgorithm, entry_of
@@ -148,6 +148,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     _refuse_dropping_all(model)
     refuse_asynchronous(model)
     give_copies(model)
+    note_transposed(model)
     return model
 
 

@@ -8,14 +8,17 @@ state at the start of an episode is zeros. For a policy of MaskablePPO, masks ar
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import torch
 from gymnasium import spaces
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 from torch import nn
 
+from palaestra_trainer.algorithms.images import transposed_images
 from palaestra_trainer.environments.data_sheet import OBSERVATION, parts_of
 from palaestra_trainer.environments.masks import ACTION_MASKS, choices_of
 from palaestra_trainer.errors import ExportError
@@ -74,7 +77,7 @@ class PolicyModule(nn.Module):
         self.policy = policy
         self.action_space: spaces.Space[Any] = loaded.model.action_space
         self._seen = parts_of(loaded.model.observation_space)
-        self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
+        self.spaces = _as_returned(loaded.model, self._seen)
         self.choices = choices_of(self.action_space) if loaded.takes_masks else []
         if self.choices and ACTION_MASKS in self.spaces:
             raise ExportError(
@@ -176,8 +179,19 @@ class Scoring(PolicyModule):
         return (torch.cat([part.logits for part in made], dim=1) if isinstance(made, list) else made.logits,)
 
 
-def as_returned(space: spaces.Space[Any]) -> spaces.Space[Any]:
-    """Return the space of images with channels last, as environments return them; other spaces unchanged."""
+def _as_returned(model: BaseAlgorithm, seen: Mapping[str, spaces.Space[Any]]) -> dict[str, spaces.Space[Any]]:
+    """Return the parts of a model's observations as the environment returns them.
+
+    An older release did not note the images that the model gets transposed. Almost all environments return
+    images with channels last, so all images of such a model count as transposed.
+    """
+    noted = transposed_images(model)
+    transposed = seen.keys() if noted is None else {key or OBSERVATION for key in noted}
+    return {name: _channels_last(space) if name in transposed else space for name, space in seen.items()}
+
+
+def _channels_last(space: spaces.Space[Any]) -> spaces.Space[Any]:
+    """Return the space of images with channels last; other spaces unchanged."""
     if not (isinstance(space, spaces.Box) and is_image_space(space) and is_image_space_channels_first(space)):
         return space
     low, high = (np.moveaxis(bound, 0, -1) for bound in (space.low, space.high))
