@@ -50,12 +50,13 @@ def test_unknown_values_are_left_out_and_times_are_rounded(values, text):
     assert text in progress_line(progress(**values))
 
 
-def test_lines_are_shown_from_the_first_response_of_the_trainer():
-    """During its start a run has no target yet, and a line without a target would mislead."""
+def test_lines_are_shown_while_the_trainer_responds():
+    """During its start a run has no target, and between two attempts its last speed is old."""
+    before, later = progress(), progress(step=13_000)
 
     class Reader:
         def __init__(self):
-            self.values = [RunProgress(), progress(), progress(step=13_000)]
+            self.values = [RunProgress(), before, before, before, later, later]
 
         def progress(self):
             return self.values.pop(0)

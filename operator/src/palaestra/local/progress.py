@@ -48,7 +48,7 @@ class ProgressReader:
         self._last = RunProgress()
 
     def progress(self) -> RunProgress:
-        """Return the newest values; while the trainer does not respond, return the last known values."""
+        """Return the newest values; while the trainer does not respond, return the same object again."""
         if (status := self._status()) is not None:
             self._last = RunProgress(
                 phase=status.phase,

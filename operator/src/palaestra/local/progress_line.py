@@ -33,17 +33,18 @@ async def show_progress(
 ) -> None:
     """Show a line at the trainer's first response, and then every `every_s` seconds, until cancelled.
 
-    Until that response, send a request every `first_s` seconds.
+    Until that response, send a request every `first_s` seconds. While the trainer does not respond, as
+    between two attempts, show nothing, because its speed and its remaining time are old.
     """
-    wait_s = first_s
+    wait_s, shown = first_s, RunProgress()
     while True:
         await asyncio.sleep(wait_s)
         # The request runs in a thread, because the trainer may take seconds to respond. Meanwhile the event
         # loop must serve the pod.
         progress = await asyncio.to_thread(reader.progress)
-        if progress.target:
+        if progress.target and progress is not shown:
             show(progress_line(progress))
-            wait_s = every_s
+            wait_s, shown = every_s, progress
 
 
 def _success(progress: RunProgress) -> str:
