@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final, Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -90,10 +91,17 @@ NodeT = TypeVar("NodeT")
 
 
 class ShapeReader(ABC, Generic[NodeT]):
-    """Reads the shapes of a boundingObject; a subclass reads the nodes, over ROS or in a simulation."""
+    """Reads the shapes of a boundingObject; a subclass reads the nodes, over ROS or in a simulation.
+
+    Attributes:
+        left_out: the number of shapes whose size no field has, by type; `parts` leaves them out.
+    """
+
+    def __init__(self) -> None:
+        self.left_out = Counter[str]()
 
     def parts(self, node: NodeT, field: str, frame: PartFrame) -> Iterator[ObstacleShape]:
-        """Yield the shapes in a field of a node, whose frame is `frame`; see `leave_out` for other shapes."""
+        """Yield the shapes in a field of a node, whose frame is `frame`; count other shapes in `left_out`."""
         for child in self.nodes(node, field):
             match self.kind(child):
                 case "Shape":
@@ -108,7 +116,7 @@ class ShapeReader(ABC, Generic[NodeT]):
                 case kind:
                     shape = self._shape(child, kind, frame)
                     if shape is None:
-                        self.leave_out(kind)
+                        self.left_out[kind] += 1
                     else:
                         yield shape
 
@@ -126,10 +134,6 @@ class ShapeReader(ABC, Generic[NodeT]):
         faces = self.nodes(node, "coord") if kind in _FACES else ()
         points = [point for coordinate in faces for point in self.points(coordinate)]
         return frame.around(points) if points else None
-
-    @abstractmethod
-    def leave_out(self, kind: str) -> None:
-        """Record that a shape is left out, because no field has its size; `kind` is the name of its type."""
 
     @abstractmethod
     def points(self, coordinate: NodeT) -> Sequence[Vector]:

@@ -132,7 +132,7 @@ def test_twins_of_one_node_have_the_same_value():
 
 
 def test_a_reset_is_noticed_before_a_longer_step():
-    """The time after such a step is later than before the reset, but noise and ranges must begin anew."""
+    """The time after a longer step is later than before the reset, so a timer cannot compare times alone."""
     simulation = Setting("stub").load(robot(""))
     timer = StepTimer(simulation.robots[0])
     simulation.step(STEP_MS)

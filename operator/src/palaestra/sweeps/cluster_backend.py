@@ -167,7 +167,7 @@ class ClusterBackend:
         )
 
     def _curve(self, run: tuple[int, int], evaluation: LastEvaluation | None) -> tuple[Point, ...]:
-        """Return the evaluations of a run that this command has seen; () if the run has none."""
+        """Return the curve of a run, with a point for each evaluation that this command has read."""
         curve: tuple[Point, ...] = ()
         if evaluation is not None:
             newest = Point(

@@ -100,7 +100,7 @@ def last_evaluation(directory: RunDirectory, step: int) -> EvaluationStatus | No
 
 
 def last_evaluated(directory: RunDirectory, step: int) -> int:
-    """Return the step of the last evaluation up to `step`; 0 if there is no evaluation.
+    """Return the number of steps at the last evaluation up to `step`; 0 without an evaluation.
 
     The file evaluations.jsonl does not contain an interrupted evaluation, so a resumed attempt repeats it.
     """

@@ -74,9 +74,9 @@ class ObstacleReader(ShapeReader[int]):
     """
 
     def __init__(self, services: Services) -> None:
+        super().__init__()
         self._services = services
         self._things: list[_Known] | None = None
-        self._left_out = Counter[str]()
 
     def forget(self) -> None:
         """Drop the known nodes, because handles become invalid when the world is reloaded."""
@@ -102,16 +102,12 @@ class ObstacleReader(ShapeReader[int]):
         ]
 
     def _find_all(self) -> list[_Known]:
-        before = self._left_out
-        self._left_out = Counter()
+        """Return all objects; warn of shapes without a known size, but not again after each start."""
+        before, self.left_out = self.left_out, Counter()
         found = list(self._find())
-        if self._left_out != before:
-            log.warning("obstacles without a known size are not in the layout", shapes=dict(self._left_out))
+        if self.left_out != before:
+            log.warning("obstacles without a known size are not in the layout", shapes=dict(self.left_out))
         return found
-
-    def leave_out(self, kind: str) -> None:
-        """Count a shape for the warning; the same shapes are reported once, not after each start."""
-        self._left_out[kind] += 1
 
     def _find(self) -> Iterator[_Known]:
         for node in self.nodes(self._ask("supervisor/get_root", "get_uint64", ask=True).value, "children"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -42,8 +41,8 @@ def shapes_of(simulation: Simulation) -> tuple[BatchShape, ...]:
 
 class _Reader(ShapeReader[SceneNode]):
     def __init__(self, simulation: Simulation) -> None:
+        super().__init__()
         self._simulation = simulation
-        self.left_out = Counter[str]()
 
     def read(self) -> Iterator[BatchShape]:
         for node in self._simulation.tree.root.nodes():
@@ -81,10 +80,6 @@ class _Reader(ShapeReader[SceneNode]):
     def nodes(self, node: SceneNode, field: str) -> tuple[SceneNode, ...]:
         """Return the nodes in a field."""
         return node.nodes(field)
-
-    def leave_out(self, kind: str) -> None:
-        """Count a shape for the warning."""
-        self.left_out[kind] += 1
 
     def points(self, coordinate: SceneNode) -> list[Vector]:
         """Return the points of a Coordinate; [] if it has more than `MOST_POINTS`."""

@@ -125,7 +125,7 @@ class Radar:
 
         Args:
             gauss: draws the noise.
-            passed_s: seconds since the last sample; 0 after a reset, which is no motion.
+            passed_s: simulated seconds since the last sample; 0 after a reset, so that no target has a speed.
         """
         if not self._enabled:
             return
