@@ -4,7 +4,9 @@
 HERE=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 CACHE=${PALAESTRA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/palaestra}
 
-say() { echo "cluster: $*" >&2; }
+# A message that cannot be written, for example to a full disk or to a pipe without a reader, does not end a script, because the
+# script must still remove the cluster.
+say() { (trap '' PIPE && echo "cluster: $*" >&2) || true; }
 die() { say "$*"; exit 1; }
 
 # Print 12 hexadecimal digits of a digest of the named files and folders; their paths are relative to this folder.

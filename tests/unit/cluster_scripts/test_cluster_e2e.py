@@ -60,17 +60,18 @@ class E2e:
             shutil.copy(CLUSTER / name, folder / "tests/cluster" / name)
 
     @contextmanager
-    def started(self, tests_end, **environment):
+    def started(self, tests_end, *, messages=subprocess.DEVNULL, **environment):
         """Run the script, and kill all its processes at the end.
 
-        The tests exit with the code `tests_end`; if it is empty, they run until they are interrupted.
+        The tests exit with the code `tests_end`; if it is empty, they run until they are interrupted. The
+        script writes its messages to the file `messages`.
         """
         kept = {name: value for name, value in os.environ.items() if name in {"PATH", "HOME", "LANG"}}
         own = {"PALAESTRA_CACHE": str(self.cache), "CALLS": str(self._calls), "TESTS_END": tests_end}
         with subprocess.Popen(
             [self._folder / "tests/cluster/e2e.sh"],
             env=kept | own | environment,
-            stderr=subprocess.DEVNULL,
+            stderr=messages,
             start_new_session=True,
         ) as process:
             try:
@@ -79,9 +80,9 @@ class E2e:
                 with suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)
 
-    def run(self, tests_end="0", **environment):
+    def run(self, tests_end="0", *, messages=subprocess.DEVNULL, **environment):
         """Run the script to its end and return its exit code."""
-        with self.started(tests_end, **environment) as process:
+        with self.started(tests_end, messages=messages, **environment) as process:
             return process.wait(END_S)
 
     @property
@@ -119,6 +120,25 @@ def test_the_cluster_goes_however_the_tests_end(e2e, code):
     assert e2e.run(code) == int(code)
 
     assert e2e.calls == ["up.sh", "tests", "down.sh"]
+    assert not (e2e.cache / "kind").exists()
+
+
+def test_the_cluster_goes_although_the_log_is_on_a_full_disk(e2e):
+    """The cluster often fills the disk itself, and only its removal makes space again."""
+    with Path("/dev/full").open("w") as log:
+        assert e2e.run("1", messages=log) == 1
+
+    assert e2e.calls == ["up.sh", "tests", "down.sh"]
+
+
+def test_the_cluster_goes_although_nobody_reads_the_messages(e2e):
+    """In `make e2e 2>&1 | head`, `head` ends before the script does."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as log:
+        e2e.run(messages=log)
+
+    assert e2e.calls[-1] == "down.sh"
     assert not (e2e.cache / "kind").exists()
 
 
