@@ -6,6 +6,7 @@ import pty
 import re
 import signal
 import socket
+import subprocess
 import zipfile
 from pathlib import Path
 
@@ -114,6 +115,19 @@ def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
     process.stdout.close()
 
     assert process.wait(PATIENCE_S) == 0
+    assert (desk.run_directory / "summary.json").exists()
+
+
+def test_a_run_whose_output_is_on_a_full_disk_ends_as_it_would_have(desk):
+    """The disk of the output may be full in the night; the run directory may be on another disk."""
+    desk.write(ASK)
+
+    with Path("/dev/full").open("w") as full:
+        process = desk.start(stdout=full, stderr=subprocess.PIPE)
+
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
+    assert errors == "standard output: No space left on device; the run goes on without its lines\n"
     assert (desk.run_directory / "summary.json").exists()
 
 

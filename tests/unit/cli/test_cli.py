@@ -1,6 +1,8 @@
 """The commands of `palaestra`: their input, their output and their exit codes."""
 
+import os
 import re
+from pathlib import Path
 
 import pytest
 import yaml
@@ -54,6 +56,29 @@ def fails(capsys):
         return err.splitlines()
 
     return run
+
+
+@pytest.mark.parametrize("command", ["plan", "--help"])
+def test_output_that_nobody_reads_is_no_error(command, job, monkeypatch, capsys):
+    """A person who types `| head` has seen enough, and a traceback would say that something is broken."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as output:
+        monkeypatch.setattr("sys.stdout", output)
+        assert main([command, str(job)]) == 0
+
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("command", ["plan", "--help"])
+def test_output_on_a_full_disk_is_one_sentence(command, job, monkeypatch, capsys):
+    """Without the error, a script would go on with half a file."""
+    with Path("/dev/full").open("w") as output:
+        monkeypatch.setattr("sys.stdout", output)
+        assert main([command, str(job)]) == 1
+
+    sentence = "standard output: No space left on device; free some space, or write to another disk\n"
+    assert capsys.readouterr().err == sentence
 
 
 @pytest.mark.parametrize("command", [["plan"], ["run"], ["sweep"], ["world", "--check"]])

@@ -13,6 +13,7 @@ from palaestra.cli.commands import COMMANDS
 from palaestra.cli.subcommands import ALL_EXIT_CODES, CONTEXT, KUBECONFIG, NAMESPACE, WRONG_INPUT
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import KILLED, LocalError
+from palaestra.standard_output import drop_output, flush_output, output_fails
 from palaestra_protocol.imports import import_without, without_collections
 from palaestra_protocol.linux import require_linux
 from palaestra_sim.errors import SimError
@@ -21,7 +22,27 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Run one command and return its exit code.
+
+    If the program that reads the output has ended, for example `| head`, the rest is no error.
+    """
+    code = 0
+    try:
+        try:
+            code = _run(arguments)
+        finally:
+            flush_output()
+    except OSError as error:
+        if not output_fails():
+            raise
+        drop_output()
+        if not isinstance(error, BrokenPipeError):
+            fact = f"standard output: {error.strerror}"
+            return _failed(f"{fact}; free some space, or write to another disk", LocalError.exit_code)
+    return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     typed = sys.argv[1:] if arguments is None else arguments
     parser = _parser(typed[:1])
     if typed and _of_a_cluster(typed[0]):
@@ -32,9 +53,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return command(options)
     except LocalError as error:
-        return _failed(error, error.exit_code)
+        return _failed(str(error), error.exit_code)
     except (PalaestraError, SimError) as error:
-        return _failed(error, WRONG_INPUT)
+        return _failed(str(error), WRONG_INPUT)
     except KeyboardInterrupt:  # Ctrl-C before a run was started
         return KILLED
 
@@ -52,8 +73,8 @@ def _module(name: str, module: str) -> ModuleType:
         raise
 
 
-def _failed(error: Exception, exit_code: int) -> int:
-    sys.stderr.write(f"{printable(str(error))}\n")
+def _failed(text: str, exit_code: int) -> int:
+    sys.stderr.write(f"{printable(text)}\n")
     return exit_code
 
 

@@ -1,7 +1,6 @@
 """The common options and exit codes of the commands for a cluster."""
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -75,9 +74,6 @@ def connected(work: Work) -> Callable[[argparse.Namespace], int]:
                 return _refused(f"{error}{hint}")
             except (ApiError, ClientError, SpecErrors) as error:
                 return _refused(str(error))
-            except BrokenPipeError:  # The program that reads the output has ended, for example `| head`.
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-                return 0
 
     return run
 

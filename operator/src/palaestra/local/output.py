@@ -18,10 +18,12 @@ import termios
 import tty
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from palaestra.local.bounded_log import LimitedFile
 from palaestra.local.errors import StorageFailed
+from palaestra.standard_output import drop_output
 
 Show = Callable[[str], None]
 KEPT_LINES = 20  # enough to show the reason for a program's end without the log file
@@ -118,12 +120,18 @@ class Log:
 
 
 def say(text: str) -> None:
-    """Print a line at once; lines are dropped if the program that reads them has ended, such as `| head`."""
+    """Print a line at once. If it cannot be written, drop it and all later lines, because the run goes on.
+
+    A warning names the reason, unless the program that reads the lines has ended, such as `| head`.
+    """
     try:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        drop_output()
+        if not isinstance(error, BrokenPipeError):
+            with suppress(OSError):
+                sys.stderr.write(f"standard output: {error.strerror}; the run goes on without its lines\n")
 
 
 def open_like(terminal: int) -> tuple[int, int]:
