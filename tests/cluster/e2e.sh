@@ -9,7 +9,8 @@ set -euo pipefail
 cd "$HERE/../.."
 
 INSTALLATION=manifests/install.yaml
-MARK=$STATE/by-e2e # exists if this script has started the cluster, and so must remove it
+MARK=$STATE/by-e2e # exists if a run of this script has started the cluster, and so must remove it
+ours=              # set before this run starts the cluster: a signal during the start is handled before the mark exists
 tests=
 images=
 installed=
@@ -24,7 +25,7 @@ finish() {
     say "KEEP=1: the cluster stands, KUBECONFIG=$(printf %q "${KUBECONFIG:-$KUBECONFIG_FILE}"); remove it with: make cluster-down"
   elif [[ ${PALAESTRA_CLUSTER:-} == existing ]]; then
     [[ -z $installed ]] || kubectl delete --ignore-not-found --timeout 120s -f "$INSTALLATION" >/dev/null || true
-  elif [[ -f $MARK || ! -f $STATE/way ]]; then
+  elif [[ $ours || -f $MARK || ! -f $STATE/way ]]; then
     say "removing the cluster"
     "$HERE/down.sh"
   fi
@@ -42,9 +43,10 @@ bring_up() {
   [[ ! -f $MARK ]] || { say "removing what a killed run left behind" && "$HERE/down.sh"; }
   local stood=
   [[ ! -f $STATE/way ]] || stood=yes
+  [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || ours=yes
   KUBECONFIG=$(setpriv --pdeathsig TERM "$HERE/up.sh") # up.sh ends with this script; otherwise a cluster without the mark could stay
   export KUBECONFIG
-  [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || touch "$MARK"
+  [[ ! $ours ]] || touch "$MARK"
 }
 
 # Build the images, and write the names of their archives to a file, because this function runs in the background while the

@@ -163,6 +163,20 @@ def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop
     assert e2e.calls == ["up.sh", "tests", "cleaned", "down.sh"]
 
 
+def test_a_signal_during_the_start_of_the_cluster_removes_it(e2e, tmp_path):
+    """The script handles the signal once up.sh has ended, and then a whole cluster stands."""
+    up = tmp_path / "tests/cluster/up.sh"
+    wait = 'mkdir -p "$PALAESTRA_CACHE"; until [[ -e $PALAESTRA_CACHE/go ]]; do sleep 0.05; done\n'
+    up.write_text(up.read_text().replace(TOLD, TOLD + wait))
+    with e2e.started(tests_end="") as process:
+        eventually(lambda: "up.sh" in e2e.calls)
+        terminate(process)
+        (e2e.cache / "go").touch()
+        assert process.wait(END_S) == INTERRUPTED
+
+    assert e2e.calls == ["up.sh", "down.sh"]
+
+
 def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
     """On a busy machine the tests may end before the script receives Ctrl-C.
 
