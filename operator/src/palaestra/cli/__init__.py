@@ -24,7 +24,7 @@ __all__ = ["main"]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
 
-    If the program that reads the output has ended, for example `| head`, the rest is no error.
+    If the reader of the output ends early, as `| head` does, the command drops the remaining lines.
     """
     code = 0
     try:
