@@ -1,12 +1,18 @@
 """Topics over a real ROS master and real sockets; a message is read when the program requests it."""
 
 import re
+import socket
 import struct
 import subprocess
 import sys
+import threading
+import time
+import xmlrpc.client
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
+from palaestra_protocol.ros.tcpros import encode_header
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.ros import RosSubscriber
 
@@ -70,6 +76,35 @@ def test_a_message_that_does_not_come_raises_an_error_in_time(peer, ranges):
     send(peer, 1.0)
 
     assert ranges.next().range == 1.0
+
+
+def test_a_busy_publisher_may_take_longer_for_a_connection_than_for_a_message(master):
+    """On a busy host, each program waits for a processor; then a short deadline looks like a hang."""
+    deadline_s, busy_s = 0.05, 0.3
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        connections = []
+
+        def accept_late():
+            connections.append(listening.accept()[0])
+            connections[0].recv(65536)
+            time.sleep(busy_s)
+            connections[0].sendall(encode_header({"callerid": "/busy"}))
+
+        node = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False)
+        node.register_function(lambda *_: [1, "", ["TCPROS", *listening.getsockname()]], "requestTopic")
+        for work in (node.handle_request, accept_late):
+            threading.Thread(target=work, daemon=True).start()
+        with node, xmlrpc.client.ServerProxy(master) as ask_master:
+            uri = "http://{}:{}/".format(*node.server_address)
+            ask_master.registerPublisher("/busy", "/busy/ir1/value", "sensor_msgs/Range", uri)
+            subscriber = RosSubscriber("/busy/ir1/value", "sensor_msgs/Range", deadline_s=deadline_s)
+
+            subscriber.connect()
+
+            with pytest.raises(SimulatorHung, match=f"within {deadline_s} s"):
+                subscriber.next()
+            subscriber.close()
+        connections[0].close()
 
 
 def test_a_killed_publisher_is_dead(peer, ranges):

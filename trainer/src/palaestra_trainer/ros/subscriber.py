@@ -26,7 +26,7 @@ from palaestra_trainer.ros.topic_node import TopicNode
 from palaestra_trainer.ros.xmlrpc import call
 
 DEADLINE_S = 0.5
-_CONNECT_S = 5.0
+_CONNECT_S = 5.0  # per response of the publisher; longer than a message, because its host may be busy
 
 
 class RosSubscriber:
@@ -36,7 +36,7 @@ class RosSubscriber:
         name: the full name, e.g. /robotino/ir1/value
         type_name: e.g. sensor_msgs/Range
         decode: returns the value in the bytes of a message; None: the whole message is decoded.
-        deadline_s: the longest time to wait for a message.
+        deadline_s: the longest time to wait for a message; a connection may take longer.
         node: the subscribing node; None: the node of this process.
 
     Raises:
@@ -86,7 +86,8 @@ class RosSubscriber:
             raise SimulatorDead(self.simulator, f"no node publishes {self.name}")
         address = self._ask_for_address(publishers[-1], node)
         header = subscriber_header(node, self.name, self._type)
-        self._wire = TcprosClient(address, header, self.simulator, self._deadline_s)
+        self._wire = TcprosClient(address, header, self.simulator, _CONNECT_S)
+        self._wire.wait_at_most(self._deadline_s)
         self._wire.acknowledge_late()
 
     def next(self) -> Any:

@@ -68,15 +68,20 @@ class TcprosClient:
         self._socket.settimeout(None)
         for option in sockets.OPTIONS:
             self._socket.setsockopt(*option)
-        timeval = _TIMEVAL.pack(int(deadline_s), int(deadline_s % 1 * 1e6))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
+        self.wait_at_most(deadline_s)
         try:
             self.send(encode_header(header))
             self._check(bytes(self.receive()))
         except SimulatorFault:
             self.close()
             raise
+
+    def wait_at_most(self, deadline_s: float) -> None:
+        """Wait at most `deadline_s` for the peer from now on, in each call."""
+        self._deadline_s = deadline_s
+        timeval = _TIMEVAL.pack(int(deadline_s), int(deadline_s % 1 * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
 
     def send(self, data: bytes) -> None:
         """Send all of `data`.
