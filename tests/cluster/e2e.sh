@@ -41,9 +41,7 @@ stop() {
 
 bring_up() {
   [[ ! -f $MARK ]] || { say "removing what a killed run left behind" && "$HERE/down.sh"; }
-  local stood=
-  [[ ! -f $STATE/way ]] || stood=yes
-  [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || ours=yes
+  [[ -f $STATE/way || ${PALAESTRA_CLUSTER:-} == existing ]] || ours=yes
   KUBECONFIG=$(setpriv --pdeathsig TERM "$HERE/up.sh") # up.sh ends with this script; otherwise a cluster without the mark could stay
   export KUBECONFIG
   [[ ! $ours ]] || touch "$MARK"
