@@ -79,7 +79,7 @@ def test_a_message_that_does_not_come_raises_an_error_in_time(peer, ranges):
 
 
 def test_a_busy_publisher_may_take_longer_for_a_connection_than_for_a_message(master):
-    """On a busy host, each program waits for a processor; then a short deadline looks like a hang."""
+    """On a busy host, a publisher waits for a processor. Its simulator must not count as hung then."""
     deadline_s, busy_s = 0.05, 0.3
     with socket.create_server(("127.0.0.1", 0)) as listening:
         connections = []
